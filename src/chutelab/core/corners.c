@@ -124,15 +124,20 @@ static double clear_of(const Shape *a, int edge, const Shape *b) {
 }
 
 /* The edge that a corner of `b` is on: the one that it is furthest out of, and inside, or within `near`, the one that
-   most of `b` is out of: else what is deep by more than its corners are apart would be pressed aside. Of an arc
-   counts how it goes on from its end. */
+   most of `b` is out of: else what is deep by more than its corners are apart would be pressed aside. Of a surface
+   counts how it goes on from its end, by the radius of the circle inside `a`: so the edge that a corner leaves over the
+   end on is the one that it came on. */
 static int edge_under(const Shape *a, const Shape *b, const double *q, double near) {
     double off, best = -INFINITY;
     int found = furthest(a, q, &off);
     Shape end = *b;
-    if (b->s && b->s->shape == ARC) {
-        double x = (q[1] - b->s->y) / b->radius, y = (b->s->x - q[0]) / b->radius, on = near / TOUCH;
-        if (x * b->s->tx + y * b->s->ty < 0) on = -on;
+    if (b->s) {
+        double x = b->s->tx, y = b->s->ty, on = near / TOUCH;
+        if (b->s->shape == ARC) {
+            x = (q[1] - b->s->y) / b->radius;
+            y = (b->s->x - q[0]) / b->radius;
+            if (x * b->s->tx + y * b->s->ty < 0) on = -on;
+        } else if (q != b->p[0]) on = -on;
         memcpy(end.p[0], q, sizeof end.p[0]);
         end.p[1][0] = q[0] + on * x;
         end.p[1][1] = q[1] + on * y;
@@ -262,8 +267,7 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
     const double *q = b->p[m];
     double best = INFINITY;
     if (m != b->round) {
-        /* An end that sinks in goes back the shortest way: the surface may be anywhere else. */
-        t->on = b->s ? furthest(a, q, &off) : edge_under(a, b, q, near);
+        t->on = edge_under(a, b, q, near);
         double length = out_of(a, t->on, n), along = n[0] * (q[1] - a->p[t->on][1]) - n[1] * (q[0] - a->p[t->on][0]);
         fill_in(a, b, t);
         return along >= 0 && along <= length && !(b->s && mate_of(b->s, m) >= 0);

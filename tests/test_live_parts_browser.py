@@ -827,6 +827,7 @@ def test_what_is_left_of_a_scene_without_its_boxes_runs(opened, tmp_path):
     assert page.evaluate("chutelab.lab.recording.tracks.length") == 2
 
 
+@pytest.mark.slow
 def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_path):
     path = tmp_path / "dominoes.html"
     call("live", "dominoes", *ROLLS, "-o", str(path))

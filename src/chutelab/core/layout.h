@@ -624,7 +624,7 @@ typedef struct {
     int each, apart;        /* [in] particles of a member, 0 without a family; each has books of its own */
     int is_whole;           /* [in] all knots and events are still there: the host took none */
     int until, landing;     /* [in] enum Until; surface that a particle lands on, or -1 */
-    int most, window;       /* [in] rounds of a particle; rounds after which it is asked whether it gets on */
+    int most, window;       /* [in] rounds of a particle; progress check interval, in rounds */
     double tick;            /* [in] s over its pace; mean time between events below which it does not */
     double far;             /* [in] m; how far off the coordinates were rounded */
     int laid, begun;        /* number after the member whose obstacles are laid; whether `lone` is */

@@ -329,6 +329,9 @@ typedef struct {
     int a[4], b[4];
 } SolverFour;
 
+/* The levers of four rows. */
+typedef struct { float own[4], own_slide[4], others[4], others_slide[4], slips[4]; } LeverFour;
+
 /* ... and what they change of a body. */
 typedef struct { float x, y, rim, pad, swept[4], course[4]; } LightBody;
 
@@ -378,6 +381,7 @@ typedef struct {
     RowLever *levers;    /* (contacts) ... of particles with corners */
     SolverBody *solver_bodies; /* (disks + 1) ... and their disks */
     SolverFour *fours;   /* (four_room) the same in single precision */
+    LeverFour *lever_fours; /* (four_room) ... and their levers */
     LightBody *light_bodies; /* (disks + 1) */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */

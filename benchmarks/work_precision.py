@@ -17,13 +17,12 @@ from rich.console import RenderableType
 from rich.text import Text
 
 import workprecision as wp
-from chutelab.checks.workprecision import REPEATS
+from chutelab.checks.workprecision import REPEATS, environment, measured_on
 from chutelab.cli.console import progress, show, show_json
 from chutelab.cli.options import FolderName, destination
 from chutelab.cli.scenes import duration
 from chutelab.util.files import tsv_text
 from chutelab.util.tables import Sheet
-from chutelab.util.versions import environment, measured_on
 from workprecision import picture
 from workprecision.claims import exponent
 

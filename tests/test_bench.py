@@ -12,13 +12,19 @@ from PIL import Image
 
 import shared
 from chutelab.checks import workprecision as bench
-from chutelab.checks.workprecision import MANY_STEPS, METHODS, Stopwatch, Timing, measure
+from chutelab.checks.workprecision import (
+    MANY_STEPS,
+    METHODS,
+    Stopwatch,
+    Timing,
+    environment,
+    measure,
+)
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.pictures.plots.studies import LOOKS
 from chutelab.pictures.plots.studies import workprecision as draw
 from chutelab.scene import load
-from chutelab.util.versions import environment
 
 call = partial(shared.call, "bench")
 

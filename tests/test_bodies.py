@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 
 from chutelab.machine.parts import Joint
 from chutelab.pictures.plots import Window, draw_scene, draw_tracks, overlay, style
-from chutelab.pictures.plots.machinery import draw_bodies, placed, stream_colours
+from chutelab.pictures.plots.machinery import draw_bodies, placed
 from chutelab.pictures.plots.scenery import energies, places, strings
+from chutelab.pictures.plots.style import stream_colours
 from chutelab.scene import parse
 from handmade import Line, machine_of, recording_of
 

@@ -448,3 +448,41 @@ def test_a_corner_that_meets_a_surface_just_inside_its_end_is_struck():
     turning = chutelab.machine.build(chutelab.load(scene)).particle.inertia
     impulse = (1.0 + e) / (1.0 / M + low[0] ** 2 / float(np.max(turning)))
     assert blow["normal_impulse"] == pytest.approx(impulse, rel=1e-12)
+
+
+def bowled(seed):
+    """A box or polygon in a bowl, whose face takes it over the end, which is at rest or moves."""
+    random = np.random.default_rng(seed)
+    kind, end = {"mass": 0.01, **a_shape(random, 0.02), "spin": True}, random.uniform(300.0, 360.0)
+    bowl = {"name": "bowl", "center": [0.0, 0.0], "radius": 0.05, "from_deg": 180.0, "to_deg": end,
+            "speed": random.uniform(0.0, 1.0), "restitution": 0.3,
+            "friction": random.uniform(0.0, 1.0)}  # fmt: skip
+    if random.random() < 0.5:
+        by = random.uniform(-0.005, 0.005, 2).tolist()
+        bowl["shake"] = {"by": by, "frequency": random.uniform(2.0, 15.0)}
+    elif random.random() < 0.5:
+        bowl["turn"] = random.uniform(-100.0, 100.0)
+        bowl["pivot"] = random.uniform(-0.02, 0.02, 2).tolist()
+    place = 0.03 * np.array([cos(a := np.radians(end - 25.0)), sin(a)])
+    stream = {"at": place.tolist(), "velocity": random.uniform(-1.0, 1.0, 2).tolist(),
+              "angle_deg": random.uniform(-180.0, 180.0),
+              "omega": random.uniform(-10.0, 10.0)}  # fmt: skip
+    return {"particle": kind, "surface": [bowl], "stream": stream, "run": {"until": 0.5}}
+
+
+@pytest.mark.parametrize("seed", [115, 125, 260, 274, 547])
+def test_a_corner_that_leaves_over_the_end_of_a_bowl_goes_on_along_its_edge(seed):
+    sound(chutelab.simulate(bowled(seed), engine="contact"))
+
+
+def test_a_box_that_turns_and_waits_for_its_place_is_released_as_it_is_written():
+    """A lid goes down through its place: it is free when that is below h / 2."""
+    lid = {"name": "lid", "from": [-0.1, 0.0], "to": [0.1, 0.0],
+             "travel": {"to": [-0.1, -0.1], "at": 0.0, "in": 0.2}}  # fmt: skip
+    run = chutelab.simulate({
+        "particle": BOX, "surface": [lid], "run": {"until": 0.2},
+        "stream": {"at": [0.0, 0.0], "velocity": [0.0, 0.0], "omega": 8.0},
+    }, engine="contact")  # fmt: skip
+    released = run.track(0)["t"][0]
+    here, before = run.pose("lid", [released, released - 1e-3])[:, 1]
+    assert here <= -0.5 * H < before

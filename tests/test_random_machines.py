@@ -12,7 +12,7 @@ STEPS = (1e-3, 2.5e-4)
 """s, of Pymunk; its errors are of the order of its step."""
 
 
-@pytest.mark.parametrize("seed", seeds(1, 100))
+@pytest.mark.parametrize("seed", seeds(0, 100))
 def test_what_swings_by_itself_does_so_in_both_engines(seed):
     """Hinges anywhere, springs, dampers, stops, motors: angles over 0.7 s of each alone."""
     scene = hung(seed)

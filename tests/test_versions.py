@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from chutelab.util import versions
-from chutelab.util.errors import MissingLibraryError
+from chutelab.util.errors import MissingLibraryError, library, too_old
 
 ROOT = Path(__file__).parent.parent
 OWN = ("pydantic>=2.9", "numpy>=1.26", "never-installed>=1", 'scipy>=1.12; extra == "design"')
@@ -33,7 +32,7 @@ def test_a_package_that_is_too_old_is_named(tmp_path, monkeypatch, version, fits
     installed(tmp_path, "pydantic", version)
     installed(tmp_path, "numpy", "2.0.0rc1")
     monkeypatch.syspath_prepend(tmp_path)
-    assert versions.too_old() == ([] if fits else [f"pydantic>=2.9 ({version} is installed)"])
+    assert too_old() == ([] if fits else [f"pydantic>=2.9 ({version} is installed)"])
 
 
 def test_no_command_goes_on_with_a_library_that_is_too_old(tmp_path):
@@ -59,7 +58,7 @@ def test_nor_does_what_an_extra_brings(tmp_path, monkeypatch):
     installed(tmp_path, "scipy", "1.7.0")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(MissingLibraryError, match=r"scipy>=1\.12 \(1\.7\.0 is installed\)"):
-        versions.library("scipy.optimize", "SciPy is needed", "design")
+        library("scipy.optimize", "SciPy is needed", "design")
 
 
 def test_what_is_to_be_cited_is_this_version():

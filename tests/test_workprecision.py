@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from chutelab.util.versions import environment
+from chutelab.checks.workprecision import environment
 from work_precision import main
 from workprecision import METHODS, Record, cases, from_tsv
 

@@ -64,7 +64,7 @@ def workprecision(records: Sequence[Record], about: Mapping[str, str]) -> Pictur
     records : sequence of Record
         From `workprecision.measure`; rows of other cases are left out.
     about : mapping
-        The machine and the versions, from `chutelab.util.versions`.
+        The machine and the versions, from `chutelab.checks.workprecision`.
     """
     shown = [case for case in cases().values() if any(one.case == case.name for one in records)]
     columns = min(3, len(shown) + 1)

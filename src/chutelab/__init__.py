@@ -79,7 +79,7 @@ __all__ = [*_HOME, "__version__"]
 def __getattr__(name: str) -> Any:
     value: Any
     if name == "__version__":
-        value = import_module("chutelab.util.versions").own_version()
+        value = import_module("chutelab.util.files").own_version()
     elif name in _HOME:
         module, _, attribute = _HOME[name].partition(":")
         value = import_module(f"chutelab.{module}")

@@ -8,11 +8,16 @@ row of figures, but says why.
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Sequence
+import os
+import platform
+import re
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from math import ceil, inf
+from pathlib import Path
 from statistics import median
 from time import perf_counter
 from typing import TypeVar
@@ -21,6 +26,7 @@ from chutelab.engines.simulation import judged
 from chutelab.scene import Scene
 from chutelab.studies.accuracy import SMALLEST, STIR, UNABLE, LateError, Search, Wanted, because
 from chutelab.util.arrays import Progress
+from chutelab.util.files import version_of
 
 T = TypeVar("T")
 
@@ -39,6 +45,9 @@ CROWD = (
     f" {STIR:g}"
 )
 """How the error is known where particles meet."""
+
+PACKAGES = ("chutelab", "numpy", "pymunk", "wasmtime", "scipy")
+"""What figures depend on, besides the processor."""
 
 REPEATS = 9
 
@@ -194,3 +203,28 @@ def _judged(
         how=CROWD if known.chaotic else known.method,
     )
     return row, Stopwatch(run, first, PATIENCE)
+
+
+def environment() -> dict[str, str]:
+    """Return processor, number of cores, system, Python and versions of packages.
+
+    What is not installed is left out; no host, user or path is in it.
+    """
+    cores = os.cpu_count() or 1
+    processor = platform.processor() or platform.machine()
+    with suppress(OSError):
+        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        if named := re.search(r"^model name[^:\n]*:(.*)", told, re.MULTILINE):
+            processor = " ".join(named[1].split())
+    found = {
+        "processor": f"{processor}, {cores} core{'s' if cores > 1 else ''}",
+        "system": platform.system(),
+        "python": f"{platform.python_implementation()} {platform.python_version()}",
+    }
+    versions = {package: version_of(package) for package in PACKAGES}
+    return found | {package: version for package, version in versions.items() if version}
+
+
+def measured_on(about: Mapping[str, str]) -> str:
+    """Return an `environment` as a line of text."""
+    return f"measured on {', '.join(f'{key} {value}' for key, value in about.items())}"

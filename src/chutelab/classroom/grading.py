@@ -34,9 +34,15 @@ from chutelab.classroom.exercises.judging import is_rounded, judge
 from chutelab.classroom.kernel import ForgedError, run
 from chutelab.classroom.lessons import OWN_WORDS
 from chutelab.classroom.lessons.texts import asset
-from chutelab.util.errors import InputError, MissingLibraryError, cut, printable, printable_lines
+from chutelab.util.errors import (
+    InputError,
+    MissingLibraryError,
+    cut,
+    printable,
+    printable_lines,
+    too_old,
+)
 from chutelab.util.files import csv_lines
-from chutelab.util.versions import too_old
 from chutelab.util.words import LANGUAGES, words
 
 LARGEST: Final = 25 << 20

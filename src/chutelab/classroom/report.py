@@ -40,9 +40,8 @@ from chutelab.scene.quantities import lookup
 from chutelab.studies.repeats import Repeats, repeat
 from chutelab.theory.discharge import loading
 from chutelab.util.errors import InputError
-from chutelab.util.files import csv_lines, whole, write_lines
+from chutelab.util.files import csv_lines, own_version, whole, write_lines
 from chutelab.util.tables import Sheet, number, plus_minus, sentence
-from chutelab.util.versions import own_version
 from chutelab.util.words import Words
 from chutelab.util.words import words as words_of
 

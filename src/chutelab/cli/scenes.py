@@ -443,9 +443,8 @@ def bench(
         crowds. [default]
     --out DIR  Write work-precision.tsv and work-precision.png into this folder.
     """
-    from chutelab.checks.workprecision import Timing, measure
+    from chutelab.checks.workprecision import Timing, environment, measure, measured_on
     from chutelab.util.files import tsv_text
-    from chutelab.util.versions import environment, measured_on
 
     loaded = loaded_as_told(scene, set_)
     about = environment()

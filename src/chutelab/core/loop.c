@@ -173,11 +173,12 @@ static double lifted(const Disk *d, const double *place) {
 /* Release a disk at t if its place is free; its event is then the end of a ride, or an impact. */
 static int release(int i, double t) {
     Disk *d = W.disks + i;
+    /* It does not turn while it waits. */
+    d->t = d->since = t;
     if (!d->goes_on && !place_is_free(i, d->x, d->y, t)) {
         d->waited = 1;
         return 0;
     }
-    d->t = d->since = t;
     d->on = -1;
     d->changes++;
     d->mode = RIDING;

@@ -40,11 +40,11 @@ from chutelab.util.errors import (
     cut,
     did_you_mean,
     nearest,
+    need_all,
     printable,
     shown,
 )
 from chutelab.util.files import first_bytes
-from chutelab.util.versions import need_all
 
 __all__ = [
     "MISSING", "RESERVED_NAMES", "About", "AnyScene", "Conveyor", "Expect", "Fault", "Incoming",

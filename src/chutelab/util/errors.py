@@ -1,4 +1,4 @@
-"""Invalid input: its faults, the error that lists them, and what was probably meant."""
+"""Invalid input, its faults and what was probably meant; libraries that are missing or too old."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import difflib
 import json
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Final
+from importlib import import_module
+from typing import Any, Final
 
 
 def did_you_mean(word: str, known: Iterable[str], otherwise: str, *, most: int = 1) -> str:
@@ -165,6 +167,67 @@ class LawWarning(UserWarning):
 
 class MissingLibraryError(ImportError):
     """A library is not installed, or too old; the text says what to install."""
+
+
+def library(module: str, what: str, extra: str) -> Any:
+    """Return a module of a package that only one of Chutelab's extras brings.
+
+    Raises a `MissingLibraryError` without it, or if it is too old; says `what`, such as "a fit
+    needs SciPy", and what to install.
+    """
+    install = f'pip install "chutelab[{extra}]"'
+    if old := too_old(extra):
+        raise MissingLibraryError(f"{what}, {'; '.join(old)}: {install}")
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise MissingLibraryError(f"{what}: {install}", name=error.name) from error
+
+
+_BOUND = re.compile(
+    r"^Requires-Dist: ([\w.-]+)[^>;\n]*>=([\d.]+)(?:.*extra == .([\w-]+))?", re.MULTILINE
+)
+_VERSION = re.compile(r"^Version: (.+)$", re.MULTILINE)
+
+
+def too_old(extra: str | None = None) -> list[str]:
+    """Return for what packages are too old that are installed, by the bounds of chutelab's own.
+
+    Such as "pydantic>=2.9 (2.7.0 is installed)". By default those that it always needs, else those
+    of one extra. Empty where it is not installed itself.
+    """
+    found = []
+    for bound in _BOUND.finditer(_metadata("chutelab")):
+        # What is not there the import says.
+        said = _VERSION.search(_metadata(bound[1])) if bound[3] == extra else None
+        if said is not None and _numbers(said[1]) < _numbers(bound[2]):
+            found.append(f"{bound[1]}>={bound[2]} ({said[1]} is installed)")
+    return found
+
+
+def _metadata(package: str) -> str:
+    """Return what is said of a package, "" of none; to read all of it takes five times as long."""
+    # Here, as the help of a command needs none of it.
+    from importlib.metadata import PackageNotFoundError, distribution
+
+    with suppress(PackageNotFoundError):
+        return distribution(package).read_text("METADATA") or ""
+    return ""
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """Return the first three numbers of a version."""
+    return (*map(int, re.findall(r"\d+", version)), 0, 0, 0)[:3]
+
+
+def need_all() -> None:
+    """Raise a `MissingLibraryError` if a package that chutelab always needs is too old.
+
+    Some of them fail only by doing less.
+    """
+    if old := too_old():
+        needed = " ".join(f'"{line.partition(" ")[0]}"' for line in old)
+        raise MissingLibraryError(f"chutelab needs {'; '.join(old)}: pip install {needed}")
 
 
 def cut(text: str, width: int) -> str:

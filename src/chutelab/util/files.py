@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and tables in them: CSV and TSV.
+"""Files that are written whole or not at all, tables in them, and the versions that they name.
 
 It imports no NumPy: commands that need none answer at once.
 """
@@ -275,3 +275,22 @@ def tsv_text(rows: Sequence[object], kind: type, about: Mapping[str, str]) -> st
     cells = [[getattr(row, name) for name in names] for row in rows]
     head = "".join(f"# {key}: {printable(value)}\n" for key, value in about.items())
     return head + "".join(csv_lines([names, *cells], separator="\t"))
+
+
+def version_of(package: str) -> str | None:
+    """Return the version of a package; None if it is not installed.
+
+    >>> version_of("no such package") is None
+    True
+    """
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def own_version() -> str:
+    """Return chutelab's version, as far as it is known."""
+    return version_of("chutelab") or "unknown (not installed)"

@@ -44,8 +44,7 @@ from chutelab.classroom.lessons import (
 from chutelab.classroom.lessons.sheets import asked, table, titled
 from chutelab.engines.simulation import judged
 from chutelab.scene import Fault, to_dict
-from chutelab.util.files import aside, refuse_other, whole
-from chutelab.util.versions import version_of
+from chutelab.util.files import aside, refuse_other, version_of, whole
 from chutelab.util.words import words
 
 _HERE: Final = Path(__file__).parent

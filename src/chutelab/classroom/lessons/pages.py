@@ -42,8 +42,7 @@ from chutelab.classroom.lessons.steps import data_of as data_of_steps
 from chutelab.classroom.lessons.texts import ASSETS, INDEX, asset, html_of, without_tex
 from chutelab.scene import Fault
 from chutelab.util.errors import MissingLibraryError, printable
-from chutelab.util.files import refuse_other, together, whole
-from chutelab.util.versions import own_version
+from chutelab.util.files import own_version, refuse_other, together, whole
 from chutelab.util.words import LANGUAGES, Words, words
 
 LIVE: Final = "page.html"

@@ -31,7 +31,7 @@ from chutelab.classroom.lessons.texts import asset, parsed, parser, typeset
 from chutelab.scene import shipped
 from chutelab.scene.overrides import parts_of, unit_of, value_at
 from chutelab.util.errors import MissingLibraryError
-from chutelab.util.versions import own_version
+from chutelab.util.files import own_version
 from chutelab.util.words import Words, words
 
 SHEETS: Final = ("student", "teacher", "explanation")

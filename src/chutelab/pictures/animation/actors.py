@@ -29,8 +29,6 @@ from chutelab.pictures.plots.machinery import (
     is_passing,
     pieces,
     points_of,
-    stream_colours,
-    stream_handles,
 )
 from chutelab.pictures.plots.scenery import (
     FINE,
@@ -43,7 +41,7 @@ from chutelab.pictures.plots.scenery import (
     strobe_times,
     track_times,
 )
-from chutelab.pictures.plots.style import figures, say
+from chutelab.pictures.plots.style import figures, say, stream_colours, stream_handles
 from chutelab.results import Recording
 from chutelab.util.arrays import Bools, Floats, Ints
 

@@ -36,8 +36,8 @@ from chutelab.scene import AnyScene, Overrides, Scene, load, to_toml
 from chutelab.scene.messages import live_of
 from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.tables import Live
-from chutelab.util.files import whole
-from chutelab.util.versions import library, own_version
+from chutelab.util.errors import library
+from chutelab.util.files import own_version, whole
 from chutelab.util.words import words
 
 __all__ = ["live"]

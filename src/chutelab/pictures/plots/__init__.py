@@ -36,7 +36,6 @@ from chutelab.pictures.plots.machinery import (
     draw_last,
     draw_scene,
     halo,
-    stream_handles,
 )
 from chutelab.pictures.plots.panels import (
     Arc,
@@ -67,7 +66,7 @@ from chutelab.pictures.plots.scenery import (
     strobe_times,
     window_of,
 )
-from chutelab.pictures.plots.style import Picture, figures, look, say
+from chutelab.pictures.plots.style import Picture, figures, look, say, stream_handles
 from chutelab.results import Recording
 from chutelab.results.quantities import prediction as predicted
 from chutelab.theory import Transfer

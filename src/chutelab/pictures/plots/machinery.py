@@ -24,10 +24,9 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
 
 from chutelab.machine import Arcs, Machine, Pieces, Segments
-from chutelab.pictures import BLUE, GREEN, ORANGE, PURPLE
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import Window, around, motion, strings
-from chutelab.pictures.plots.style import figures, named, say
+from chutelab.pictures.plots.style import figures, named, say, stream_colours
 from chutelab.results import Recording
 from chutelab.util.arrays import Floats, Ints
 
@@ -461,39 +460,6 @@ def _spot(where: Floats, gap: float, normal: Floats) -> Spot:
 
 ARROWS = "→↗↑↖←↙↓↘"
 """Which way a straight surface moves, in eighths of a turn."""
-
-
-def stream_colours(count: int) -> list[str]:
-    """Return a colour for each stream; the sixth to the tenth are nearer to the ink.
-
-    Orange, that of what is known analytically, comes as late as may be.
-    """
-    hues = (style.STREAM, PURPLE, ORANGE, BLUE, GREEN)
-    every = [*hues, *(style.tint(hue, 0.6, style.INK) for hue in hues)]
-    return [every[i % len(every)] for i in range(count)]
-
-
-LONGEST = 20
-"""Characters of a stream's name in a legend."""
-
-
-def stream_handles(machine: Machine) -> list[Line2D]:
-    """Return what a legend needs to name the streams, unless it is particle 0 alone."""
-    colours = stream_colours(len(machine.streams))
-    sizes = np.bincount(machine.releases.stream, minlength=len(colours))
-    return [
-        Line2D(
-            [],
-            [],
-            ls="none",
-            marker="o",
-            ms=6.0,
-            color=color,
-            label=style.plain(named(one)[:LONGEST]),
-        )
-        for i, (one, color) in enumerate(zip(machine.streams, colours, strict=True))
-        if i or sizes[0] > 1
-    ]
 
 
 class Bodies:

@@ -16,7 +16,6 @@ from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike
 
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.machinery import stream_colours
 from chutelab.pictures.plots.scenery import (
     FINE,
     drawn_tracks,
@@ -31,7 +30,7 @@ from chutelab.pictures.plots.scenery import (
     track_times,
     upright,
 )
-from chutelab.pictures.plots.style import figures, named, say, spoken
+from chutelab.pictures.plots.style import figures, named, say, spoken, stream_colours
 from chutelab.results import Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger

@@ -19,7 +19,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from chutelab.checks.workprecision import METHODS, Timing
+from chutelab.checks.workprecision import METHODS, PACKAGES, Timing
 from chutelab.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.machinery import draw_scene
@@ -34,7 +34,6 @@ from chutelab.studies.sweep.rows import ERROR, RARE, mean_and_error
 from chutelab.theory.discharge import NAMES
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.tables import plus_minus
-from chutelab.util.versions import PACKAGES
 
 BARS = (BLUE, SKY)
 KINDS = (SKY, ORANGE, GREEN, VERMILION, GREY)

@@ -23,9 +23,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
+from matplotlib.lines import Line2D
 from matplotlib.ticker import ScalarFormatter
 from numpy.typing import ArrayLike
 
+from chutelab.machine import Machine
 from chutelab.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from chutelab.util.errors import printable
 from chutelab.util.files import whole
@@ -277,6 +279,31 @@ def legend_above(ax: Axes, columns: int, handles: list[Any] | None = None) -> No
         legend = ax.legend(**options, ncols=ncols)
         if legend.get_window_extent().x1 <= ax.get_window_extent().x1:
             return
+
+
+def stream_colours(count: int) -> list[str]:
+    """Return a colour for each stream; the sixth to the tenth are nearer to the ink.
+
+    Orange, that of what is known analytically, comes as late as may be.
+    """
+    hues = (colours()["STREAM"], PURPLE, ORANGE, BLUE, GREEN)
+    every = [*hues, *(tint(hue, 0.6, colours()["INK"]) for hue in hues)]
+    return [every[i % len(every)] for i in range(count)]
+
+
+LONGEST = 20
+"""Characters of a stream's name in a legend."""
+
+
+def stream_handles(machine: Machine) -> list[Line2D]:
+    """Return what a legend needs to name the streams, unless it is particle 0 alone."""
+    hues = stream_colours(len(machine.streams))
+    sizes = np.bincount(machine.releases.stream, minlength=len(hues))
+    return [
+        Line2D([], [], ls="none", marker="o", ms=6.0, color=hue, label=plain(named(one)[:LONGEST]))
+        for i, (one, hue) in enumerate(zip(machine.streams, hues, strict=True))
+        if i or sizes[0] > 1
+    ]
 
 
 def scientific(value: float, unit: str) -> str:

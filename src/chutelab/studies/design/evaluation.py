@@ -45,8 +45,7 @@ from chutelab.studies.sweep import Crew
 from chutelab.studies.sweep.plan import Block, are_family, runs
 from chutelab.studies.sweep.rows import touches
 from chutelab.util.arrays import Bools, Floats, Ints, Progress
-from chutelab.util.errors import InputError
-from chutelab.util.versions import library
+from chutelab.util.errors import InputError, library
 
 T = TypeVar("T")
 

@@ -27,7 +27,7 @@ import numpy as np
 from chutelab.studies.design.evaluation import Evaluator, Span, scipy
 from chutelab.studies.sweep.rows import mean_and_error
 from chutelab.util.arrays import Floats
-from chutelab.util.versions import library
+from chutelab.util.errors import library
 
 PENALTY: Final = 10.0
 """What missing a target or a limit by its own spread over the range counts, in spreads of what is

@@ -48,8 +48,7 @@ from chutelab.studies.measured.track import (
     run,
 )
 from chutelab.util.arrays import Bools, Floats
-from chutelab.util.errors import did_you_mean
-from chutelab.util.versions import library
+from chutelab.util.errors import did_you_mean, library
 
 __all__ = [
     "Fit", "MeasuredError", "Placement", "Residuals", "Track", "find", "fit", "read",

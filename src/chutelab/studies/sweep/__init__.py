@@ -60,9 +60,8 @@ from chutelab.studies.sweep.rows import (
     write_csv,
 )
 from chutelab.util.arrays import Progress
-from chutelab.util.errors import InputError
-from chutelab.util.files import writing
-from chutelab.util.versions import library, own_version
+from chutelab.util.errors import InputError, library
+from chutelab.util.files import own_version, writing
 
 __all__ = [
     "COLUMNS", "DESIGNS", "MOST_VARIANTS", "REASON", "TEXTS", "TOUCHES", "Crew",

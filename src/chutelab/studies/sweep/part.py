@@ -30,8 +30,7 @@ from chutelab.scene import to_dict
 from chutelab.studies.sweep.plan import Plan
 from chutelab.studies.sweep.rows import Columns, columns_of, synced
 from chutelab.util.errors import InputError
-from chutelab.util.files import csv_columns, writing
-from chutelab.util.versions import version_of
+from chutelab.util.files import csv_columns, version_of, writing
 
 if sys.platform == "win32":
     import msvcrt

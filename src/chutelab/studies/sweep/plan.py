@@ -39,8 +39,7 @@ from chutelab.scene.variants import (
 )
 from chutelab.studies.sweep.rows import ERROR, REASON, TEXTS, Columns, averaged, empty, rows
 from chutelab.util.arrays import Floats, Ints
-from chutelab.util.errors import InputError
-from chutelab.util.versions import library
+from chutelab.util.errors import InputError, library
 
 DESIGNS: Final = {"lhs": "LatinHypercube", "sobol": "Sobol"}
 """Names of the designs, and of the classes of `scipy.stats.qmc` that draw them."""
@@ -51,7 +50,7 @@ MOST_VARIANTS: Final = 1_000_000
 MOST_KEYS: Final = 20
 """Keys varied at once."""
 
-TOGETHER: Final = 8192
+TOGETHER: Final = 4096
 """Particles of the variants in a block that goes through the exact engine at once."""
 
 EXACT: Final = 16

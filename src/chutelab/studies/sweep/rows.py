@@ -29,10 +29,9 @@ from chutelab.results.stream import told_fates
 from chutelab.scene.quantities import COLUMNS, FORMER, HEAT, PAID, REGISTRY, lookup
 from chutelab.scene.variants import Quantity
 from chutelab.util.arrays import Floats
-from chutelab.util.errors import InputError
+from chutelab.util.errors import InputError, library
 from chutelab.util.files import csv_columns, csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, many, number
-from chutelab.util.versions import library
 
 Rows = Mapping[str, NDArray[Any]]
 

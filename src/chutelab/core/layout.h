@@ -192,6 +192,7 @@ typedef struct {
     double impulse[3];      /* N m s; of its stops, and of its motor ... */
     double need[2], most;   /* rad/s, N m s; ... the least change that the stops ask for, and a bound */
     double drift;           /* rad/s; what springs and weight make of its speed by the middle of the step */
+    double acted;           /* s; up to when its motor has given what it gives */
     int surface;            /* [in] which moves */
     int stirs;              /* whether it moves in this step */
     int solved;             /* its impulses are of a step that begins now */
@@ -329,6 +330,9 @@ typedef struct {
     int a[4], b[4];
 } SolverFour;
 
+/* The levers of four rows. */
+typedef struct { float own[4], own_slide[4], others[4], others_slide[4], slips[4]; } LeverFour;
+
 /* ... and what they change of a body. */
 typedef struct { float x, y, rim, pad, swept[4], course[4]; } LightBody;
 
@@ -378,6 +382,7 @@ typedef struct {
     RowLever *levers;    /* (contacts) ... of particles with corners */
     SolverBody *solver_bodies; /* (disks + 1) ... and their disks */
     SolverFour *fours;   /* (four_room) the same in single precision */
+    LeverFour *lever_fours; /* (four_room) ... and their levers */
     LightBody *light_bodies; /* (disks + 1) */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */

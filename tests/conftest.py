@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,17 @@ def pytest_configure(config):
     """Draw more where slow tests are asked for."""
     if "not slow" not in config.option.markexpr:
         settings.load_profile("many")
+
+
+def pytest_sessionstart(session):
+    """Divide the test modules among workers to be compiled: each finds the others' in the cache."""
+    told = getattr(session.config, "workerinput", None)
+    if told is not None:
+        some = slice(int(told["workerid"].removeprefix("gw")), None, told["workercount"])
+        for path in sorted(Path(__file__).parent.glob("test_*.py"))[some]:
+            # What cannot be imported is told when it is collected.
+            with suppress(Exception, pytest.skip.Exception):
+                importlib.import_module(path.stem)
 
 
 # Modules and tests stay: no garbage is looked for among them.

@@ -15,8 +15,6 @@ from math import hypot, inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
-from scipy.stats import kstest
 
 from chutelab.results import Kind
 
@@ -224,6 +222,9 @@ def maxwell_boltzmann(velocity):
     Each component is normal with variance kT/m = <v²>/2. Samples of one run have to be some
     collisions of each disk apart to be independent.
     """
+    # Here, as to import it takes a second.
+    from scipy.stats import kstest
+
     sigma = sqrt((velocity**2).sum(axis=1).mean() / 2.0)
     return kstest(velocity.ravel() / sigma, "norm").pvalue
 
@@ -261,6 +262,8 @@ def overlaps(recording, times):
 
 def pair_overlaps(x, r):
     """Return the overlaps, in the smaller's radii, of all disks (k, 2), (k,) that touch."""
+    from scipy.spatial import cKDTree
+
     if not len(x):
         return np.zeros(0)
     i, j = cKDTree(x).query_pairs(2.0 * np.max(r), output_type="ndarray").T

@@ -165,6 +165,7 @@ def test_beyond_a_million_times_a_change_no_order_is_looked_for(growth, compared
         return (1e-9 * growth if one.engine == other.engine else 1e-3), "all"
 
     monkeypatch.setattr("chutelab.checks.agreement.distance", apart)
+    monkeypatch.setattr("chutelab.checks.agreement.NEARBY", (1.0,))
     said = rows_of("slip", "run.until=0.6")["contact, exact"].quantity
     assert said.startswith("order" if compared else "a change of the inputs comes out 1e+07")
 

@@ -184,8 +184,8 @@ def test_rides_and_slides_come_to_what_exact_says_in_second_order(machine, most)
 
 
 LAWS = (
-    "no one through", "no one inside", "released into room", "no overlap", "pressed for a step",
-    "no one through another", "ledger closes",
+    "nothing through", "nothing inside", "released into room", "no overlap", "pressed for a step",
+    "nothing through another", "ledger closes",
 )  # fmt: skip
 
 

@@ -5,12 +5,12 @@ import json
 import re
 from math import cbrt, cos, pi, radians, sin, sqrt, tan
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from PIL import Image
-from scipy.stats import norm
 
 import chutelab
 import typed as design
@@ -406,8 +406,9 @@ def test_uncertainty_of_a_linear_quantity(linear):
     assert linear.nominal[0] == pytest.approx(R + D, rel=1e-12, abs=0.0)
     assert linear.mean[0] == pytest.approx(R + D, abs=0.002 * deviation)
     assert linear.deviation[0] == pytest.approx(deviation, rel=0.005)
-    low, high = norm.interval(0.95, R + D, deviation)
-    np.testing.assert_allclose(linear.interval[0], [low, high], rtol=0, atol=0.05 * deviation)
+    known = NormalDist(R + D, deviation)
+    ends = [known.inv_cdf(share) for share in (0.025, 0.975)]
+    np.testing.assert_allclose(linear.interval[0], ends, rtol=0, atol=0.05 * deviation)
     shares = np.array([SR**2, SD**2]) / deviation**2
     np.testing.assert_allclose(linear.indices[0].first, shares, rtol=0, atol=0.01)
     np.testing.assert_allclose(linear.indices[0].total, shares, rtol=0, atol=0.01)
@@ -447,11 +448,11 @@ def test_draws_beyond_the_scenes_domain_are_cut_and_said():
     found = design.uncertainty(machine(), "restitution=0.95±0.05", ["landing.x"], samples=256)
     (one,) = found.spreads
     assert one.key == "plate.restitution"
-    assert one.cut == pytest.approx(norm.cdf(-1.0), rel=1e-9)
+    assert one.cut == pytest.approx(NormalDist().cdf(-1.0), rel=1e-9)
     assert found.inputs.max() <= 1.0
     # The mean of a normal distribution cut one deviation above its mean.
     assert found.inputs.mean() == pytest.approx(
-        0.95 - 0.05 * norm.pdf(1.0) / norm.cdf(1.0), abs=5e-4
+        0.95 - 0.05 * NormalDist().pdf(1.0) / NormalDist().cdf(1.0), abs=5e-4
     )
     assert "16 % of plate.restitution" in repr(found)
 
@@ -510,7 +511,7 @@ def test_uniform_and_relative_spreads():
     assert (distance.law, distance.spread) == ("uniform", pytest.approx(0.02))
     np.testing.assert_allclose(distance.values(np.array([0.0, 0.5, 1.0])), [0.48, 0.5, 0.52])
     quartiles = speed.values(np.array([0.25, 0.5, 0.75]))
-    np.testing.assert_allclose(quartiles, norm.ppf([0.25, 0.5, 0.75], 2.0, 0.2), rtol=1e-12)
+    np.testing.assert_allclose(quartiles, NormalDist(2.0, 0.2).quantiles(), rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -189,7 +189,7 @@ def test_pictures_of_the_gallery_move_on_hover_and_focus_but_not_against_a_reade
         assert picture.bounding_box()["height"] == pytest.approx(box["height"], abs=1.0)
         page.mouse.move(0, 0)
         assert page.evaluate(shown) == still
-        # Who presses wants it to move.
+        # A click on it starts it.
         link.click()
         assert (page.evaluate(shown), link.inner_text()) == (moves, "Stop the film")
         link.click()

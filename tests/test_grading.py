@@ -426,7 +426,7 @@ def test_rows_are_on_the_disk_as_they_come_and_a_full_one_tears_none(tmp_path):
     assert seen == [written.replace("\na", "\nb.ipynb,,,,,,,0,0,,nothing,,,,,,0,0\r\na")]
     assert part.read_bytes().decode() == seen[0]
     assert path.read_text(encoding="utf-8") == "what was there before"
-    # Whoever comes next does not write over it.
+    # A second call does not write over it.
     with pytest.raises(FileExistsError):
         write_csv([row], path)
     part.unlink()

@@ -554,7 +554,10 @@ def test_particles_that_were_dropped_are_taken_back_and_dropped_again(shown):
             "#fault", "engine", marks=pytest.mark.slow,
         ),
         (lambda page, at: page[: at + 2000] + "!!" + page[at + 2002 :], "#fault", "engine"),
-        (lambda page, at: page[: at + 4000], "#broken", "This page does not start"),
+        pytest.param(
+            lambda page, at: page[: at + 4000], "#broken", "This page does not start",
+            marks=pytest.mark.slow,
+        ),
     ],
     ids=["core", "no base64", "half a file"],
 )  # fmt: skip

@@ -793,6 +793,22 @@ def test_dominoes_run_whole_and_a_box_is_made_turned_caught_and_saved(shown, tmp
     page.locator("[id$='.angle_deg'][id^='field-own-stream']").fill("30")
     page.locator("[id$='.angle_deg'][id^='field-own-stream']").press("Enter")
     assert given(page)["stream"][-1]["angle_deg"] == 30
+    # Its slider reaches further than that now.
+    slider = page.locator(".entry:has([id$='.angle_deg'][id^='field-own-stream']) [type=range]")
+    assert float(slider.get_attribute("max")) > 30 == float(slider.input_value())
+    page.evaluate("chutelab.lab.restart()")
+    # The dashes round it are turned, before its release and while it falls.
+    assert page.evaluate(WHOLE) == "done"
+    turned = """([name, t, i]) => { const { bench, lab } = chutelab;
+      bench.inspector.choose(name); lab.seek(t);
+      const [[x, y], [u, v]] = document.querySelector(".outline polygon").getAttribute("points")
+        .split(" ").map((point) => point.split(",").map(Number));
+      return [Math.atan2(y - v, u - x), lab.recording.tracks[i].angle(t)]; }"""
+    for t in (0.0, 0.75):
+        assert page.evaluate(turned, ["box1", t, 21])[0] == pytest.approx(np.radians(30)), t
+    shown, own = page.evaluate(turned, ["row", 0.6, 0])
+    assert shown == pytest.approx(own, abs=1e-9)
+    assert own < -0.5
     page.evaluate("chutelab.lab.restart()")
     assert same_bits(page, tmp_path, 0.9) > 100
 
@@ -811,6 +827,7 @@ def test_what_is_left_of_a_scene_without_its_boxes_runs(opened, tmp_path):
     assert page.evaluate("chutelab.lab.recording.tracks.length") == 2
 
 
+@pytest.mark.slow
 def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_path):
     path = tmp_path / "dominoes.html"
     call("live", "dominoes", *ROLLS, "-o", str(path))

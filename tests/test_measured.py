@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from scipy.stats import binom
 
 from chutelab import measured
 from chutelab.cli import main
@@ -309,6 +308,8 @@ def test_uncertainties_cover_the_truth_as_often_as_they_say(scene, real):
 
     The counts of each parameter lie in the central 99.8 % of their binomial distributions.
     """
+    from scipy.stats import binom
+
     fits, off = 64, []
     for seed in range(fits):
         track = filmed(real, frames=60.0, seed=1000 + seed, begin=0.4)

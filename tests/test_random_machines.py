@@ -16,7 +16,7 @@ FINER = (2.5e-4, 6.25e-5, 1.5e-5)
 """s; so many are tried until one is as near as its order."""
 
 
-@pytest.mark.parametrize("seed", seeds(1, 100))
+@pytest.mark.parametrize("seed", seeds(0, 100))
 def test_what_swings_by_itself_does_so_in_both_engines(seed):
     """Hinges anywhere, springs, dampers, stops, motors: angles over 0.7 s of each alone."""
     scene = hung(seed)

@@ -1,4 +1,4 @@
-"""The same command leaves the same files to the last bit, whoever runs it, where and when."""
+"""The same command leaves the same files to the last bit, on any machine, for any user."""
 
 import json
 import os

@@ -37,12 +37,13 @@ def test_the_bins_of_the_galton_board_are_binomial(count):
 @pytest.mark.parametrize(
     ("bar", "small", "large", "share"),
     [
-        pytest.param(0.004, [0.002, 0.003], [0.013, 0.015], 0.8, marks=pytest.mark.slow),
+        (0.004, [0.002, 0.003], [0.013, 0.015], 0.8),
         # What is as large as a gap lodges in it, and what is smaller lies on that.
         (0.0055, [0.0015, 0.0035], [0.013, 0.015], 0.3),
-        pytest.param(0.0015, [0.002, 0.003], [0.005, 0.0055], 0.8, marks=pytest.mark.slow),
+        (0.0015, [0.002, 0.003], [0.005, 0.0055], 0.8),
     ],
 )
+@pytest.mark.slow
 def test_who_falls_through_the_screen_is_smaller_than_its_gap(bar, small, large, share):
     changes = {"surface.bars.radius": bar, "stream.fines.count": 100, "stream.lumps.count": 20}
     changes |= {"particle.small.radius": small, "particle.large.radius": large, "expect": None}

@@ -301,6 +301,7 @@ def test_a_long_explanation_and_a_long_name_come_back(platform):
     assert {call[-1] for call in page.evaluate("calls")} == {"0"}
 
 
+@pytest.mark.slow
 def test_platforms_that_refuse_or_are_none_are_told_of(platform):
     platform.start("the-bounce")
     page = platform("/package/index.html")

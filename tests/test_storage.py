@@ -102,7 +102,7 @@ def test_a_file_appears_only_when_it_is_whole(tmp_path):
         assert not path.exists()
         assert unfinished.parent.parent == tmp_path
     assert path.read_text() == "some"
-    # who has the old file open goes on reading it
+    # a program that has the old file open goes on reading it
     with path.open() as reader:
         with whole(path) as unfinished:
             unfinished.write_text("more")
@@ -144,7 +144,7 @@ def test_files_move_together_or_not_at_all(tmp_path):
 
 
 def test_an_error_of_a_file_that_is_made_names_the_one_that_was_meant(tmp_path):
-    """What is copied is not to blame for a full disk, nor a folder nobody has heard of."""
+    """The error of a full disk names neither the source of a copy nor a temporary folder."""
 
     def fail(*names):
         with whole(tmp_path / "a.txt") as unfinished:
@@ -158,7 +158,7 @@ def test_an_error_of_a_file_that_is_made_names_the_one_that_was_meant(tmp_path):
 
 
 def test_what_a_killed_program_left_is_removed_by_the_next_and_nothing_else(tmp_path):
-    """Old and held by nobody: a program that is killed loses its locks, one that runs has them."""
+    """Old and without a lock: a program that is killed loses its locks, one that runs has them."""
     with aside(tmp_path) as running:
         old = [running, tmp_path / f"{running.name[:-8]}abcdefgh", tmp_path / ".chutelab-notes"]
         for folder in old[1:]:

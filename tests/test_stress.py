@@ -47,7 +47,7 @@ def test_each_law_is_a_line_with_figure_and_bound():
     rows = re.findall(r"^ok  ([a-z ]*[a-z]) +(\d\S*) +(\d\S*)  (.+)$", shown, re.M)
     assert [name for name, *_ in rows] == [
         "finite numbers", "time goes forward", "none lost", "lasts to the end",
-        "no one through", "no one inside", "bounces off something", "released into room",
+        "nothing through", "nothing inside", "bounces off something", "released into room",
         "friction of the pair", "rebound of the pair", "energy never rises", "ledger closes",
         "loads",
     ]  # fmt: skip
@@ -84,13 +84,13 @@ def test_a_broken_law_is_told_and_is_exit_code_1(monkeypatch):
 def test_what_is_not_promised_is_told_with_its_reason():
     arguments = ["stream", "--set", "stream.count=40", "--engine", "pymunk", "--dt", "0.0333"]
     shown = call(*arguments).stdout
-    assert re.search(r"^-   no one through +\d+ +0  ", shown, re.M)
+    assert re.search(r"^-   nothing through +\d+ +0  ", shown, re.M)
     words = " ".join(shown.split())
     assert re.search(r"not promised: up to \d+ radii in a step, and contacts are", words)
     assert shown.endswith(" laws kept, 1 not promised\n")
     told = json.loads(call(*arguments, "--json").stdout)
     (one,) = (law for law in told["laws"] if law["unpromised"])
-    assert (told["broken"], one["law"], one["holds"]) == (0, "no one through", False)
+    assert (told["broken"], one["law"], one["holds"]) == (0, "nothing through", False)
 
 
 @pytest.mark.parametrize(

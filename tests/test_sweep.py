@@ -1,4 +1,4 @@
-"""Sweeps: every row agrees with a single run to 1e-12, whoever does the work, and when."""
+"""Sweeps: every row agrees with a single run to 1e-12, whichever process computes it, and when."""
 
 import json
 from math import sqrt

@@ -170,7 +170,7 @@ def test_the_file_of_finished_rows_is_a_file():
             sweep_to(plan, "n" * 250 + ".csv", team)
 
 
-# who writes it -----------------------------------------------------------------------------------
+# its writer ------------------------------------------------------------------------------------
 
 
 def test_a_sweep_that_runs_is_told_from_one_that_was_interrupted(interrupted):

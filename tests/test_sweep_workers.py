@@ -1,4 +1,4 @@
-"""Who does the work of a sweep: nothing depends on it, nor on whether they all stay alive."""
+"""Processes of a sweep: its rows depend neither on how many there are, nor on whether one dies."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Texts that somebody else wrote, titles, names, paths: shown as they are, and never obeyed."""
+"""Texts from users, titles, names, paths: shown as they are, and never obeyed."""
 
 import re
 from functools import cache

@@ -46,7 +46,7 @@ FLAGS = (
 round as doubles do."""
 
 ONCE = (
-    "exact", "exact_pieces", "hand", "loads", "nominal", "plan", "prepare", "random",
+    "exact_pieces", "hand", "loads", "nominal", "plan", "prepare", "random",
     "releases", "room",
 )  # fmt: skip
 """Files that a run passes through once, or once an event: they are compiled for size, which leaves

@@ -41,7 +41,7 @@ def environment(**more):
 
 
 def begun(words, folder, **options):
-    """Begin a command in a session of its own, so that whoever is left over is found."""
+    """Begin a command in a session of its own, so that processes that are left over are found."""
     return subprocess.Popen(
         [sys.executable, "-m", "chutelab", *words],
         cwd=folder,
@@ -92,7 +92,7 @@ def there(folder):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """What each command leaves if nobody disturbs it, and how long it takes."""
+    """What each command leaves if it is not disturbed, and how long it takes."""
     known = {}
 
     def of(name):
@@ -120,7 +120,7 @@ def check_left(folder, name, whole, *, killed=False):
         if path.endswith(".part"):
             continue
         if killed and any(part.startswith(".") for part in Path(path).parts):
-            continue  # nobody can clean up after KILL
+            continue  # no program can clean up after KILL
         assert path in expected, f"{name} left {path}"
         assert data == expected[path], f"{path} of {name} is torn"
 
@@ -133,7 +133,7 @@ def stopped(name, number, after, folder, whole):
     time.sleep(after)
     running.send_signal(number)
     code, said = ended(running, PATIENCE)
-    # In the last moment of the interpreter nobody listens: a shell has 128 + number then too.
+    # In the last moment of the interpreter no handler runs: a shell has 128 + number then too.
     allowed = {0, -9} if number == signal.SIGKILL else {0, 128 + number, -number}
     assert code in allowed, said
     assert "Traceback" not in said

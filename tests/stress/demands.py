@@ -6,7 +6,7 @@ from chutelab.checks.stress import EPS, Verdict
 from chutelab.checks.stress.barriers import closest
 from chutelab.results import REASONS
 
-UNSEEN = ("nobody leaves", "nobody sinks", "lies still")
+UNSEEN = ("none leaves", "none sinks", "lies still")
 """Demands that are lost, as some laws are, once a disk is on the wrong side of something."""
 
 SUNK = 0.02
@@ -35,7 +35,7 @@ def ended(e, reasons):
 
 
 def inside(e, box):
-    """Nobody leaves a box (left, right, bottom, top, m); the figure counts those who do."""
+    """No particle leaves a box (left, right, bottom, top, m); the figure counts those that do."""
     left, right, bottom, top = box
 
     def outside(position):
@@ -53,7 +53,7 @@ def inside(e, box):
 
 
 def sunk(e):
-    """At rest nobody lies deeper in anything than `SUNK`; the figure is a share of the radius."""
+    """At rest no disk lies deeper in anything than `SUNK`; the figure is a share of the radius."""
     r = e.machine.particle.radius
     _, last = e.recording.ends()
     position = last["position"]
@@ -70,7 +70,7 @@ def sunk(e):
 
 
 def still(e):
-    """At the end nobody moves; the figure is the largest speed, m/s."""
+    """At the end no particle moves; the figure is the largest speed, m/s."""
     _, last = e.recording.ends()
     speed = np.hypot(*last["velocity"].T) + e.machine.particle.radius * np.abs(last["omega"])
     i = int(np.argmax(speed))
@@ -112,9 +112,9 @@ def demands(case, e):
     if case.ends:
         out["ends as it must"] = ended(e, case.ends)
     if case.inside is not None:
-        out["nobody leaves"] = inside(e, case.inside)
+        out["none leaves"] = inside(e, case.inside)
     if case.at_rest:
-        out["nobody sinks"], out["lies still"] = sunk(e), still(e)
+        out["none sinks"], out["lies still"] = sunk(e), still(e)
     if case.formula is not None and (verdict := case.formula(e)) is not None:
         out["closed formula"] = verdict
     return out

@@ -93,12 +93,12 @@ def test_a_centre_on_the_other_side_went_through(place):
         knots["position"][-1, 0] = 1.5
         knots["velocity"][-1] = knots["velocity"][0] = [3.0, 0.0]
 
-    assert barriers.no_one_through(evidence(flight)).holds
-    bad = barriers.no_one_through(evidence(flight, knots=jump))
+    assert barriers.nothing_through(evidence(flight)).holds
+    bad = barriers.nothing_through(evidence(flight, knots=jump))
     assert bad.figure == 1
     assert "particle 0 through wall" in bad.detail
     past = merged(flight, {"stream": {"at": [0.0, 1.0 + place]}})
-    assert barriers.no_one_through(evidence(past, knots=jump)).holds
+    assert barriers.nothing_through(evidence(past, knots=jump)).holds
 
 
 def test_a_passage_there_and_back_within_one_interval_is_seen():
@@ -110,11 +110,11 @@ def test_a_passage_there_and_back_within_one_interval_is_seen():
     built = machine.build(scene_of({**thrown_up, "surface": [ceiling]}, "test", "exact", None))
     assert np.count_nonzero(np.abs(recording.knots["position"][:, 1]) < 0.02) == 2
     under = replace(recording, knots=recording.knots.copy())
-    assert barriers.no_one_through(Evidence(replace(under, machine=built))).holds
+    assert barriers.nothing_through(Evidence(replace(under, machine=built))).holds
     up = recording.knots.copy()
     up["velocity"][:, 1] *= 2.0
     over = Evidence(replace(recording, machine=built, knots=up))
-    assert barriers.no_one_through(over).figure == 2
+    assert barriers.nothing_through(over).figure == 2
     first, *_ = over.recording.laws
     assert first.law == "nothing through a surface"
 
@@ -197,7 +197,7 @@ def test_slow_disks_whose_centres_come_within_a_radius_went_through_each_other()
         second["position"][:, 0] = 0.5 + second["t"] - second["t"][0]
         second["position"][:, 1] = 0.015
 
-    good, bad = (barriers.no_one_through_another(e) for e in (crowd(), crowd(knots=ghosts)))
+    good, bad = (barriers.nothing_through_another(e) for e in (crowd(), crowd(knots=ghosts)))
     assert (good.figure, good.bound) == (0, 0.0)
     assert bad.figure == 1
     assert "0 and 1" in bad.detail
@@ -267,7 +267,7 @@ def test_what_rides_on_a_belt_that_will_throw_it_has_not_settled():
 
 
 def test_fast_disks_in_steps_all_alike_are_promised_no_surface():
-    """Who goes farther than its radius in a step may be beyond a surface before it is seen."""
+    """A disk that goes farther than its radius in a step may cross a surface unseen."""
     slow, fast = (evidence(PAIR, "pymunk", dt) for dt in (1e-3, 0.1))
     radii = np.hypot(*fast.recording.knots["velocity"].T).max() * 0.1 / 0.02
     assert laws.unseen(slow) == ""
@@ -278,11 +278,11 @@ def test_fast_disks_in_steps_all_alike_are_promised_no_surface():
 
 
 def test_only_what_such_disks_may_break_is_not_promised(monkeypatch):
-    for name in ("no one through", "ledger closes"):
+    for name in ("nothing through", "ledger closes"):
         monkeypatch.setitem(laws.LAWS, name, lambda e: Verdict(1.0, 0.0))
     found = {one.law: one for one in judge(evidence(PAIR, "pymunk", 0.1))}
-    assert not found["no one through"].broken
-    assert "radii in a step" in found["no one through"].unpromised
+    assert not found["nothing through"].broken
+    assert "radii in a step" in found["nothing through"].unpromised
     assert found["ledger closes"].broken
     kept = {one.law: one for one in judge(evidence(PAIR, "pymunk", 1e-3))}
-    assert kept["no one through"].broken
+    assert kept["nothing through"].broken

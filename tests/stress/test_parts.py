@@ -55,8 +55,8 @@ def test_an_arc_is_passed_between_its_ends_only(degrees, through):
         knots["position"][-1] = 2.0 * RIM * direction
         knots["velocity"] = 2.0 * RIM * direction
 
-    assert barriers.no_one_through(evidence(still)).figure == 0
-    bad = barriers.no_one_through(evidence(still, knots=out))
+    assert barriers.nothing_through(evidence(still)).figure == 0
+    bad = barriers.nothing_through(evidence(still, knots=out))
     assert bad.figure == through
     assert not through or "particle 0 through bowl" in bad.detail
 
@@ -100,10 +100,10 @@ def test_a_gate_is_there_only_while_it_is_closed(keys, through):
         knots["position"] = np.stack([knots["t"], np.zeros(len(knots))], axis=-1)
         knots["velocity"] = [1.0, 0.0]
 
-    assert barriers.no_one_through(e).holds
+    assert barriers.nothing_through(e).holds
     assert barriers.depth(e).holds
     passed = evidence(gated(**keys), knots=straight)
-    assert barriers.no_one_through(passed).figure == through
+    assert barriers.nothing_through(passed).figure == through
     assert barriers.depth(passed).holds == (not through)
 
 
@@ -112,7 +112,7 @@ def test_a_gate_shuts_on_nobody(engine):
     """Closed at 0.495 s, when the centre is 5 mm before it: the disk flies on."""
     e = evidence(gated(closes_at=0.495), engine, None if engine == "exact" else 1e-3)
     assert e.recording.knots["position"][-1, 0] == pytest.approx(1.0, rel=1e-9)
-    for law in (barriers.depth, barriers.no_one_through):
+    for law in (barriers.depth, barriers.nothing_through):
         assert law(e).holds
 
 
@@ -149,7 +149,7 @@ def test_two_sizes_overlap_by_what_lacks_to_the_sum_of_their_radii():
     assert not barriers.overlap(bad).holds
     assert not barriers.pressed(bad).holds
     # The centre of the smaller is nearly outside the larger, 20 mm: it has not passed.
-    assert barriers.no_one_through_another(bad).holds
+    assert barriers.nothing_through_another(bad).holds
 
 
 def test_momentum_counts_each_mass():

@@ -384,7 +384,7 @@ double left_open(void);
 double slip_of(const SolverRow *row);
 
 /* fours.c */
-double sweep_fours(int rows, int all_bodies, int sweeps, int plain, double accurate, double most);
+double sweep_fours(int rows, int all_bodies, int cornered, int sweeps, int plain, double accurate, double most);
 
 /* solver.c */
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,

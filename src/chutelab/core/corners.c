@@ -130,7 +130,8 @@ static double clear_of(const Shape *a, int edge, const Shape *b) {
 static int edge_under(const Shape *a, const Shape *b, const double *q, double near) {
     double off, best = -INFINITY;
     int found = furthest(a, q, &off);
-    Shape end = *b;
+    Shape end;
+    if (off >= near) return found;
     if (b->s) {
         double x = b->s->tx, y = b->s->ty, on = near / TOUCH;
         if (b->s->shape == ARC) {
@@ -142,9 +143,11 @@ static int edge_under(const Shape *a, const Shape *b, const double *q, double ne
         end.p[1][0] = q[0] + on * x;
         end.p[1][1] = q[1] + on * y;
         end.count = 2;
+        end.round = -1;
+        b = &end;
     }
-    for (int e = 0; e < a->count && off < near; e++) {
-        double clear = clear_of(a, e, &end);
+    for (int e = 0; e < a->count; e++) {
+        double clear = clear_of(a, e, b);
         if (clear <= best) continue;
         best = clear;
         found = e;
@@ -474,7 +477,7 @@ static int closes_faster(int i, int j, double t, double within, double soft) {
 double meet_corners(int i, int j, double from, double until, double soft) {
     double span = until - from, most = fastest_of(i, j, from, span), small = inner_of(i, j), near = TOUCH * small;
     double h = 0, first = INFINITY, gap[CANDIDATES];
-    int sides[MOST_CORNERS], closed = 0;
+    int sides[MOST_CORNERS], in_reach[CANDIDATES], many = 0, closed = 0;
     if (!(span > 0) || most == INFINITY || most <= soft) return INFINITY;
     Shape a = shape_of(i, from), b = shape_of(j, from);
     int count = a.count + b.count, on_segment = b.s && b.s->shape == SEGMENT;
@@ -485,16 +488,18 @@ double meet_corners(int i, int j, double from, double until, double soft) {
         if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c, near);
         gap[c] = gap_at(&a, &b, near, &now);
         closed |= gap[c] <= 0;
+        if (gap[c] <= most * span) in_reach[many++] = c;
     }
     if (closed && closes_faster(i, j, from, 0, soft)) return from;
-    while (h < span && first == INFINITY) {
+    while (h < span && first == INFINITY && many) {
         double least = INFINITY, last = from + h;
-        for (int c = 0; c < count; c++)
-            if (gap[c] > 0) least = MIN(least, gap[c]);
+        for (int n = 0; n < many; n++)
+            if (gap[in_reach[n]] > 0) least = MIN(least, gap[in_reach[n]]);
         h = MIN(h + MAX(least / most, span / STRIDES), span);
         double t = h < span ? from + h : until;
         Shape a2 = shape_of(i, t), b2 = shape_of(j, t);
-        for (int c = 0; c < count; c++) {
+        for (int n = 0; n < many; n++) {
+            int c = in_reach[n];
             Touch now = {.which = c};
             if (on_segment && c < a.count) now.on = sides[c];
             double before = gap[c];
@@ -706,59 +711,79 @@ static void give_all(const Contact *c, const double *impulse) {
     if (answers) answer_with_joints();
 }
 
-/* What the places of a blow feel of masses where joints answer: by impulses that change velocities by as much as `size`,
-   m/s, and are taken back. */
-static void feel_joints(Contact *list, int count, double size) {
-    for (Contact *c = list; c < list + count; c++)
-        for (int n = 0; n < 2; n++) {
-            double u[3], v[3], one[3] = {0, 0, 0}, back[3] = {0, 0, 0};
-            one[n] = size * W.disks[c->i].mass;
-            back[n] = -one[n];
-            relative(c, 0, u);
-            give_all(c, one);
-            relative(c, 0, v);
-            give_all(c, back);
-            double gives = v[n] - u[n];
-            /* Joints may hold it as it is. */
-            c->mass[n] = gives > HELD * size ? one[n] / gives : 0;
+/* What impulses at the places of a blow change of the velocities at all: normal, slip and turn of each, 1/kg. */
+static double feels[3 * MOST_TOUCHES][3 * MOST_TOUCHES];
+
+/* Scalar products of directions of two places, normal and along: 0 for the turn, which has none. */
+static double along_both(const Contact *c, int n, const Contact *o, int k) {
+    if (n == 2 || k == 2) return 0;
+    if (n == k) return c->nx * o->nx + c->ny * o->ny;
+    double cross = c->nx * o->ny - c->ny * o->nx;
+    return n ? -cross : cross;
+}
+
+/* Work out what the places of a blow feel. Where joints answer, by impulses that change velocities by as much as `size`,
+   m/s, and are taken back; they may hold a place as it is. */
+static void feel(Contact *list, int count, double size) {
+    for (int m = 0; m < 3 * count; m++) {
+        const Contact *c = list + m / 3;
+        const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+        double one[3] = {0, 0, 0}, back[3] = {0, 0, 0}, u[MOST_TOUCHES][3], v[3];
+        double mass = a->inv_mass + (c->two ? b->inv_mass : 0);
+        if (m % 3 == 2 && c->arm == 0) continue;
+        for (int n = 0; n < count && answers; n++) relative(list + n, 0, u[n]);
+        one[m % 3] = size * a->mass;
+        back[m % 3] = -one[m % 3];
+        if (answers) give_all(c, one);
+        for (int n = 0; n < count; n++) {
+            const Contact *o = list + n;
+            if (answers) relative(o, 0, v);
+            for (int k = 0; k < 3; k++) {
+                double *to = &feels[3 * n + k][m];
+                if (answers) {
+                    double gives = (v[k] - u[n][k]) / one[m % 3];
+                    *to = 3 * n + k == m && !(gives > HELD / a->mass) ? 0 : gives;
+                    continue;
+                }
+                double own = k < 2 ? o->own[k] : 1, others = k < 2 ? o->others[k] : -1;
+                *to = mass * along_both(o, k, c, m % 3) + own * (m % 3 < 2 ? c->own[m % 3] : 1) * a->inv_inertia;
+                if (c->two) *to += others * (m % 3 < 2 ? c->others[m % 3] : -1) * b->inv_inertia;
+                if (c->hung) *to += o->lever[k] * c->lever[m % 3] / W.movers[c->hung - 1].inertia;
+            }
         }
-    forget_answers();
+        if (answers) give_all(c, back);
+    }
+    if (answers) forget_answers();
 }
 
 /* Impulses at all places such that gaps do not close, or open as fast as they are to, and that friction, a share of
    it, stops slip as far as it may, and a disk's rolling friction its rolling, unless there are joints. */
 static void share_blow(Contact *list, int count, const double *back, double share) {
-    double size = 0;
-    for (int n = 0; n < count; n++) size = MAX(size, back[n]);
-    for (int sweep = 0; sweep < SWEEPS; sweep++) {
-        double worst = 0, v[3];
-        for (int n = 0; n < count; n++) {
-            Contact *c = list + n;
-            double *J = c->impulse, change[3] = {0, 0, 0};
-            relative(c, 0, v);
-            size = MAX(size, fabs(v[0]) + fabs(v[1]));
-            change[0] = MAX(J[0] + c->mass[0] * (back[n] - v[0]), 0) - J[0];
-            give_all(c, change);
-            J[0] += change[0];
-            if (c->mass[0] > 0) worst = MAX(worst, fabs(change[0]) / c->mass[0]);
-            double most = share * MIN(c->friction, share < 1 ? ROUGH : INFINITY) * J[0];
-            relative(c, 0, v);
-            change[0] = 0;
-            change[1] = MIN(MAX(J[1] - c->mass[1] * v[1], -most), most) - J[1];
-            give_all(c, change);
-            J[1] += change[1];
-            if (c->mass[1] > 0) worst = MAX(worst, fabs(change[1]) / c->mass[1]);
-            double arm = answers ? 0 : share * c->arm * J[0];
-            if (arm == 0 && J[2] == 0) continue;
-            relative(c, 0, v);
-            change[1] = 0;
-            change[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -arm), arm) - J[2];
-            give_all(c, change);
-            J[2] += change[2];
-            worst = MAX(worst, fabs(change[2]) / c->mass[2] * W.disks[MAX(c->j, 0)].radius);
-        }
-        if (worst <= ENDS * size) return;
+    double size = 0, v[3 * MOST_TOUCHES];
+    for (int n = 0; n < count; n++) {
+        size = MAX(size, back[n]);
+        relative(list + n, 0, v + 3 * n);
     }
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        double worst = 0;
+        for (int m = 0; m < 3 * count; m++) {
+            const Contact *c = list + m / 3;
+            if (m % 3 == 2 && c->arm == 0) continue;
+            double *J = list[m / 3].impulse, gives = feels[m][m], most = INFINITY, least = 0;
+            if (m % 3) {
+                most = (m % 3 == 1 ? share * MIN(c->friction, share < 1 ? ROUGH : INFINITY) : answers ? 0 : share * c->arm) * J[0];
+                least = -most;
+            } else size = MAX(size, fabs(v[m]) + fabs(v[m + 1]));
+            double wanted = J[m % 3] + (gives > 0 ? ((m % 3 ? 0 : back[m / 3]) - v[m]) / gives : 0);
+            double change = MIN(MAX(wanted, least), most) - J[m % 3];
+            if (change == 0) continue;
+            J[m % 3] += change;
+            for (int k = 0; k < 3 * count; k++) v[k] += feels[k][m] * change;
+            worst = MAX(worst, fabs(change) * gives * (m % 3 < 2 ? 1 : W.disks[MAX(c->j, 0)].radius));
+        }
+        if (worst <= ENDS * size) break;
+    }
+    for (int n = 0; n < count; n++) give_all(list + n, list[n].impulse);
 }
 
 /* Find the impulses of a blow. Newton's restitution with friction, or at several places, may seem to give energy where
@@ -821,7 +846,7 @@ RARELY void strike_corners(int i, int j, double t) {
     for (int strings = 1; strings;) {
         double wanted[MOST_TOUCHES];
         memcpy(wanted, back, sizeof back);
-        if (answers) feel_joints(list, count, fastest);
+        feel(list, count, fastest);
         lost = share_out_blow(list, count, wanted, u);
         strings = answers && let_go_again();
         for (int n = 0; n < count && strings; n++) {

@@ -56,23 +56,36 @@ static inline void scatter(const int *which, Four *v) {
     for (int k = 0; k < 4; k++) set(&W.light_bodies[which[k]].x, v[k]);
 }
 
-/* As `give`, of four rows. */
-static inline Four give(SolverFour *f, int rolls) {
+/* As `give`, of four rows; `rolls` and `cornered` are of all of them. */
+static inline Four give(SolverFour *f, int rolls, int cornered) {
+    const LeverFour *l = W.lever_fours + (cornered ? f - W.fours : 0);
     Four a[4], b[4], nx = get(f->nx), ny = get(f->ny), J = get(f->impulse), T = get(f->along), mass = get(f->mass);
     gather(f->a, a);
     gather(f->b, b);
     Four x = less(a[0], b[0]), y = less(a[1], b[1]);
     Four opens = sum(sum(by(x, nx), by(y, ny)), get(f->opens));
-    Four slips = sum(less(by(x, ny), by(y, nx)), sum(sum(a[2], b[2]), get(f->slips)));
+    Four turn = sum(a[2], b[2]);
+    if (cornered) {
+        opens = sum(opens, sum(by(a[2], get(l->own)), by(b[2], get(l->others))));
+        turn = sum(by(a[2], get(l->own_slide)), by(b[2], get(l->others_slide)));
+    }
+    Four slips = sum(less(by(x, ny), by(y, nx)), sum(turn, get(f->slips)));
     Four given = low(by(less(get(f->more), opens), mass),
                      by(wasm_f32x4_neg(sum(opens, by(get(f->gives), J))), get(f->eases)));
     given = high(given, by(wasm_f32x4_neg(sum(opens, get(f->parts))), mass));
     Four normal = high(sum(J, given), all(0));
+    if (cornered) slips = sum(slips, by(get(l->slips), less(normal, J)));
     Four along = within(less(T, by(get(f->slide_mass), slips)), by(get(f->rough), normal));
     Four more = less(normal, J), push = less(along, T);
     Four change = high(wasm_f32x4_abs(by(more, get(f->light))), wasm_f32x4_abs(by(push, get(f->slide_light))));
     Four px = sum(by(more, nx), by(push, ny)), py = less(by(more, ny), by(push, nx));
-    Four ra = by(push, get(f->turn_a)), rb = by(push, get(f->turn_b));
+    Four ra = push, rb = push;
+    if (cornered) {
+        ra = sum(by(more, get(l->own)), by(push, get(l->own_slide)));
+        rb = sum(by(more, get(l->others)), by(push, get(l->others_slide)));
+    }
+    ra = by(ra, get(f->turn_a));
+    rb = by(rb, get(f->turn_b));
     set(f->impulse, normal);
     set(f->along, along);
     if (rolls) {
@@ -129,16 +142,16 @@ static inline int hasten(int age, int rolls) {
 }
 
 /* As `sweep_rows`. */
-static inline double sweep(int sweeps, int plain, double accurate, double most, int rolls) {
+static inline double sweep(int sweeps, int plain, double accurate, double most, int rolls, int cornered) {
     double worst = 0;
     int age = 0;
     for (int n = 0; n < sweeps; n++) {
         Four change = all(0);
         if (n >= plain && (n - plain) % 2 == 0) age = hasten(n == plain ? 0 : age, rolls);
         if ((sweeps - n) % 2)
-            for (SolverFour *f = W.fours; f < W.fours + fours; f++) change = high(change, give(f, rolls));
+            for (SolverFour *f = W.fours; f < W.fours + fours; f++) change = high(change, give(f, rolls, cornered));
         else
-            for (SolverFour *f = W.fours + fours - 1; f >= W.fours; f--) change = high(change, give(f, rolls));
+            for (SolverFour *f = W.fours + fours - 1; f >= W.fours; f--) change = high(change, give(f, rolls, cornered));
         worst = greatest(change);
         W.sweep_count++;
         if (worst <= accurate) return worst;
@@ -150,7 +163,7 @@ static inline double sweep(int sweeps, int plain, double accurate, double most, 
 static inline float bounded(double a) { return (float)MIN(a, ANY); }
 
 /* Sort rows into fours; return whether there is room for them, and whether one rolls. */
-static int set_fours(int rows, int *rolls) {
+static int set_fours(int rows, int cornered, int *rolls) {
     int begin[COLOURS + 1] = {0};
     fours = 0;
     for (int n = 0; n < rows; n++) {
@@ -171,6 +184,7 @@ static int set_fours(int rows, int *rolls) {
     }
     if (fours > W.four_room) return 0;
     for (int n = 0; n < fours; n++) W.fours[n] = (SolverFour){.nx = {0}};
+    for (int n = 0; n < fours && cornered; n++) W.lever_fours[n] = (LeverFour){.own = {0}};
     for (int n = 0; n < rows; n++) {
         SolverRow *r = W.rows + n;
         const SolverBody *a = W.solver_bodies + r->a, *b = W.solver_bodies + r->b;
@@ -199,6 +213,15 @@ static int set_fours(int rows, int *rolls) {
         f->turn_b[k] = (float)b->turn;
         f->impulse[k] = (float)r->impulse[0];
         f->along[k] = (float)r->impulse[1];
+        if (cornered) {
+            const RowLever *from = W.levers + n;
+            LeverFour *l = W.lever_fours + r->four / 4;
+            l->own[k] = (float)from->own[0];
+            l->own_slide[k] = (float)from->own[1];
+            l->others[k] = (float)from->others[0];
+            l->others_slide[k] = (float)from->others[1];
+            l->slips[k] = (float)from->slips;
+        }
         if (!*rolls) continue;
         f->arm[k] = (float)r->arm;
         f->spin[k] = (float)r->spin;
@@ -215,15 +238,17 @@ static int set_fours(int rows, int *rolls) {
 
 /* Sweep over so many rows by fours, as `sweep_rows` does, up to changes of `most`; the rows have what was found, which is
    for `scale` to take up, unless the sweeps diverge. */
-double sweep_fours(int rows, int all_bodies, int sweeps, int plain, double accurate, double most) {
-    int rolls = 0;
-    if (!set_fours(rows, &rolls)) return INFINITY;
+double sweep_fours(int rows, int all_bodies, int cornered, int sweeps, int plain, double accurate, double most) {
+    int rolls = cornered;
+    if (!set_fours(rows, cornered, &rolls)) return INFINITY;
     bodies = all_bodies;
     for (int n = 0; n < bodies; n++) {
         const SolverBody *b = W.solver_bodies + n;
         W.light_bodies[n] = (LightBody){.x = (float)b->x, .y = (float)b->y, .rim = (float)b->rim};
     }
-    double worst = rolls ? sweep(sweeps, plain, accurate, most, 1) : sweep(sweeps, plain, accurate, most, 0);
+    double worst;
+    if (cornered) worst = sweep(sweeps, plain, accurate, most, 1, 1);
+    else worst = rolls ? sweep(sweeps, plain, accurate, most, 1, 0) : sweep(sweeps, plain, accurate, most, 0, 0);
     for (SolverRow *r = W.rows; r < W.rows + rows && worst < INFINITY; r++) {
         const SolverFour *f = W.fours + r->four / 4;
         double normal = f->impulse[r->four % 4], bound = r->rough * normal, arm = r->arm * normal;

@@ -329,6 +329,9 @@ typedef struct {
     int a[4], b[4];
 } SolverFour;
 
+/* The levers of four rows. */
+typedef struct { float own[4], own_slide[4], others[4], others_slide[4], slips[4]; } LeverFour;
+
 /* ... and what they change of a body. */
 typedef struct { float x, y, rim, pad, swept[4], course[4]; } LightBody;
 
@@ -378,6 +381,7 @@ typedef struct {
     RowLever *levers;    /* (contacts) ... of particles with corners */
     SolverBody *solver_bodies; /* (disks + 1) ... and their disks */
     SolverFour *fours;   /* (four_room) the same in single precision */
+    LeverFour *lever_fours; /* (four_room) ... and their levers */
     LightBody *light_bodies; /* (disks + 1) */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */
@@ -620,7 +624,7 @@ typedef struct {
     int each, apart;        /* [in] particles of a member, 0 without a family; each has books of its own */
     int is_whole;           /* [in] all knots and events are still there: the host took none */
     int until, landing;     /* [in] enum Until; surface that a particle lands on, or -1 */
-    int most, window;       /* [in] rounds of a particle; rounds after which it is asked whether it gets on */
+    int most, window;       /* [in] rounds of a particle; progress check interval, in rounds */
     double tick;            /* [in] s over its pace; mean time between events below which it does not */
     double far;             /* [in] m; how far off the coordinates were rounded */
     int laid, begun;        /* number after the member whose obstacles are laid; whether `lone` is */

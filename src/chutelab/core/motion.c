@@ -1,6 +1,6 @@
 /* Surfaces whose motion is prescribed: where one is at a time, how fast, and when a disk meets it.
 
-   Whoever asks for a surface's place has it put there first, by `surface_at`: disks are at times of
+   Code that asks for a surface's place puts it there first, by `surface_at`: disks are at times of
    their own within a step. Its pivot p shakes and travels, and it turns about that:
 
        p(t) = p0 + by sin(2 pi f t + phase) + way share(t),    angle(t) = turn t,

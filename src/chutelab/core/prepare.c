@@ -262,6 +262,7 @@ static void make_contact_room(int room) {
     RESERVE(W.levers, W.outline_count ? room : 0);
     W.four_room = W.interact ? room / 4 : 0;
     RESERVE(W.fours, W.four_room);
+    RESERVE(W.lever_fours, W.outline_count ? W.four_room : 0);
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
 }
 

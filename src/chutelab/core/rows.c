@@ -356,8 +356,8 @@ double sweep_rows(int sweeps, int plain, double accurate) {
 /* The same by fours, if there are enough of them; INFINITY, too, where that is left to `sweep_rows`. */
 double sweep_lightly(int sweeps, int plain, double accurate) {
     double most = DIVERGES * (W.soft + W.skip / W.solver_bodies[1].bend);
-    if (rows < LARGE || cornered) return INFINITY;
-    double worst = sweep_fours(rows, bodies, sweeps, plain, accurate, most);
+    if (rows < LARGE) return INFINITY;
+    double worst = sweep_fours(rows, bodies, cornered, sweeps, plain, accurate, most);
     if (worst < INFINITY) scale(1);
     return worst;
 }

@@ -235,32 +235,30 @@ static void carry_to_end(int i, int first, double h) {
     last->need += 0.5 * MAX(press, 0) * until;
 }
 
-static RARELY int are_touching(int i, int j) {
-    Touch places[MOST_TOUCHES];
-    return list_touches(i, j, W.t, TOUCH * inner_of(i, j), W.t, places) > 0;
+/* The same at places at which a particle with corners touches j. */
+static RARELY int add_places(int i, int j, double bound, double h, const Touch *places, int count) {
+    for (int n = 0; n < count; n++)
+        if (!add(i, j, inner_of(i, j), bound, h, places + n)) return 0;
+    return 1;
 }
 
-/* The same at all places at which a particle with corners touches j. */
-static RARELY int add_places(int i, int j, double bound, double h) {
-    Touch places[MOST_TOUCHES];
-    double least = inner_of(i, j);
-    int count = list_touches(i, j, W.t, TOUCH * least, W.t + h, places);
-    for (int n = 0; n < count; n++)
-        if (!add(i, j, least, bound, h, places + n)) return 0;
-    return 1;
+/* ... and list them before. */
+static int list_places(int i, int j, double h, Touch *places) {
+    return list_touches(i, j, W.t, TOUCH * inner_of(i, j), W.t + h, places);
 }
 
 /* List the contacts of the step, waking sleepers that are touched; 0 if there is no room. */
 int find_contacts(double h, int *woke) {
+    Touch places[MOST_TOUCHES];
     W.contact_count = 0;
     *woke = 0;
     for (int n = 0; n < W.near_count; n++) {
-        int i = W.near[2 * n], j = W.near[2 * n + 1], cornered = is_cornered(i, j);
+        int i = W.near[2 * n], j = W.near[2 * n + 1], touches = 0, cornered = is_cornered(i, j);
         if (cornered && !W.disks[i].corners) { int k = i; i = j; j = k; }
         Disk *a = W.disks + i, *b = W.disks + j;
         double least = MIN(a->radius, b->radius), reach = a->radius + b->radius + TOUCH * least;
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
-        if (cornered && !are_touching(i, j)) continue;
+        if (cornered && !(touches = list_places(i, j, h, places))) continue;
         /* What the step before left over is taken up here. */
         int impacts = MAX(a->impacts, b->impacts);
         double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least, 0);
@@ -272,7 +270,7 @@ int find_contacts(double h, int *woke) {
             *woke = 1;
         }
         if (a->mode != FREE && !cornered) { int k = i; i = j; j = k; }
-        if (cornered ? !add_places(i, j, bound, h) : !add(i, j, least, bound, h, 0)) return 0;
+        if (cornered ? !add_places(i, j, bound, h, places, touches) : !add(i, j, least, bound, h, 0)) return 0;
     }
     if (*woke) return 1;
     for (int i = W.low; i < W.high; i++) {
@@ -289,7 +287,8 @@ int find_contacts(double h, int *woke) {
             double inside = pressed_inside(d, k), most = MAX(bound, inside ? W.soft + 2 * h * inside : 0);
             if (d->supports && W.stirs) most += 2 * h * hastes(surface_at(k, d->t), d);
             if (has_corners(d)) most = MAX(most, left_over(d, d->impacts, k, d->radius, 0));
-            if (has_corners(d) ? !add_places(i, -1 - k, most, h) : !add(i, -1 - k, d->radius, most, h, 0)) return 0;
+            int touches = has_corners(d) ? list_places(i, -1 - k, h, places) : 0;
+            if (has_corners(d) ? !add_places(i, -1 - k, most, h, places, touches) : !add(i, -1 - k, d->radius, most, h, 0)) return 0;
         }
         if (W.contact_count > first && !has_corners(d)) carry_to_end(i, first, h);
         for (Contact *c = W.contacts + first; W.interact && c < W.contacts + W.contact_count; c++) {

@@ -63,16 +63,21 @@ def fates(recording: Record) -> NDArray[Any]:
     left, bottom, right, top = machine.releases.exit_box[particles].T
     (x, y), out = last["position"].T, recording.ended_by("exit")[particles]
     gone = out | (x < left) | (x > right) | (y < bottom) | (y > top)
-    said[particles[gone]] = _ways_out(recording, particles[gone], last["position"][gone])
-    stays, places = particles[~gone], last["position"][~gone]
-    there, names = Places(recording), recording.surfaces[:-1]
-    belts = [name for name in names if name in moving(machine)]
-    order = [*belts, *(name for name in names if name not in belts)]
+    if gone.any():
+        said[particles[gone]] = _ways_out(recording, particles[gone], last["position"][gone])
+    stays, places, until = (every[~gone] for every in (particles, last["position"], last["t"]))
+    there, names, moved = Places(recording), recording.surfaces[:-1], moving(machine)
+    order = sorted(names, key=lambda name: name not in moved)
     home = np.full(len(stays), -1)
+    if machine.landing >= 0:
+        home[recording.ended_by("landed")[stays]] = order.index("outgoing")
     for n, name in enumerate(order):
-        home[(home < 0) & there.bare(stays, places, name, last["t"][~gone])] = n
+        left = np.flatnonzero(home < 0)
+        if len(left):
+            lies = there.bare(stays[left], places[left], name, until[left])
+            home[left[lies]] = n
     if machine.interact:
-        one, two = there.touching(stays, places, last["t"][~gone])
+        one, two = there.touching(stays, places, until)
         reached = -1
         while (now := int(np.count_nonzero(home >= 0))) > reached:
             reached, before = now, home.copy()
@@ -83,9 +88,7 @@ def fates(recording: Record) -> NDArray[Any]:
         # In its bed a particle is carried at its height, whatever it touches.
         rides = machine.releases.carried.copy()
         rides[recording.select(Kind.SEPARATION, surface="incoming")["particle"]] = False
-        home[rides[stays]] = order.index("incoming")
-    if machine.landing >= 0:
-        home[recording.ended_by("landed")[stays]] = order.index("outgoing")
+        home[rides[stays] & ~recording.ended_by("landed")[stays]] = order.index("incoming")
     said[stays] = [f"on {order[n]}" if n >= 0 else "in the air" for n in home.tolist()]
     return said
 

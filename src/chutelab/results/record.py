@@ -578,12 +578,12 @@ def kept(
     """
     form = signature(reader)
     name, usual = (reader.__module__, reader.__name__), [*form.parameters.values()][1:]
-    plain = (*name, *(one.default for one in usual))
+    defaults = [one.default for one in usual]
 
     @wraps(reader)
     def read(record: Record, /, *args: Args.args, **more: Args.kwargs) -> Result:
-        key: tuple[Any, ...] = plain
-        if args or more:
+        key: tuple[Any, ...] = (*name, *args, *defaults[len(args) :])
+        if more:
             given = form.bind(record, *args, **more)
             given.apply_defaults()
             key = (*name, *given.args[1:])

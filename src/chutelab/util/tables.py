@@ -218,6 +218,8 @@ def plain(value: Any) -> Any:
     >>> plain({"x": (1.0, float("nan")), "n": (1, 2)})
     {'x': [1.0, None], 'n': [1, 2]}
     """
+    if value is None or isinstance(value, str | int):
+        return value
     if hasattr(value, "tolist"):  # what NumPy has
         value = value.tolist()
     if isinstance(value, float):

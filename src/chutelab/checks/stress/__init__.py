@@ -29,8 +29,8 @@ from chutelab.checks.stress.barriers import (
     Verdict,
     cone,
     depth,
-    no_one_through,
-    no_one_through_another,
+    nothing_through,
+    nothing_through_another,
     on_something,
     overlap,
     pressed,
@@ -242,7 +242,7 @@ def need_judged(scene: Scene) -> None:
         raise SceneError(scene.source, faults)
 
 
-UNSEEN = ("no one through", "no one through another")
+UNSEEN = ("nothing through", "nothing through another")
 """Laws that fail once a disk is on the wrong side of another or of a surface."""
 
 
@@ -268,8 +268,8 @@ LAWS: dict[str, Law] = {
     "time goes forward": ordered,
     "none lost": released,
     "lasts to the end": lasting,
-    "no one through": no_one_through,
-    "no one inside": depth,
+    "nothing through": nothing_through,
+    "nothing inside": depth,
     "bounces off something": on_something,
     "released into room": released_free,
     "friction of the pair": cone,
@@ -277,7 +277,7 @@ LAWS: dict[str, Law] = {
     "settled to stay": settled_to_stay,
     "no overlap": overlap,
     "pressed for a step": pressed,
-    "no one through another": no_one_through_another,
+    "nothing through another": nothing_through_another,
     "energy never rises": energy,
     "ledger closes": residual,
     "momentum": momentum,

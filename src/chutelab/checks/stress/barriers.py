@@ -137,7 +137,7 @@ COLLISIONS = 300
 """Collisions, and releases, at which that is done besides, at most."""
 
 
-def no_one_through(e: Evidence) -> Verdict | None:
+def nothing_through(e: Evidence) -> Verdict | None:
     """No centre passes a surface between its ends; the figure counts the passages."""
     if not e.machine.pieces or not len(e.recording.knots):
         return None
@@ -199,7 +199,7 @@ def pressed(e: Evidence) -> Verdict | None:
     return worst(found, bound, "r")
 
 
-def no_one_through_another(e: Evidence) -> Verdict | None:
+def nothing_through_another(e: Evidence) -> Verdict | None:
     """Slow disks do not pass through each other; the figure counts the pairs.
 
     Slow are two that come nearer by less than the smaller radius in a step: an engine sees them in

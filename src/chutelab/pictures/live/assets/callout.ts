@@ -158,9 +158,10 @@ function drawOutline(stage: Stage) {
     const stream = machine?.streams.indexOf(name) ?? -1;
     machine?.releases.forEach((release, i) => {
       if (release.stream !== stream || bodies.length > 40) return;
-      const state = recording?.tracks[i]?.state(t) ?? release;
+      const track = recording?.tracks[i], now = track?.state(t);
+      const state = now ?? release, angle = track && now ? track.angle(t) : release.angle;
       const r = Math.max(LEAST, machine.radius[i] * view.scale);
-      const corners = cornersOf(machine, i, state, recording?.tracks[i]?.angle(t) ?? 0);
+      const corners = cornersOf(machine, i, state, angle);
       bodies.push([corners.length ? svg("polygon", { points: corners.map(([x, y]) =>
         `${view.px(x)},${view.py(y)}`).join(" ") })
         : svg("circle", { cx: view.px(state.x), cy: view.py(state.y), r }), 0]);

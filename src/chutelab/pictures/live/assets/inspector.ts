@@ -140,9 +140,9 @@ class Fields {
 
   /** A slider over the range of a number. */
   slider(field: Field, row: any) {
-    const { key, name, table } = field, { from, to, step } = this.rangeOf(field);
-    const slider = html("input", { type: "range", min: String(from), max: String(to), step: String(step),
-      "aria-label": this.words.key(table, name) });
+    const { key, name, table } = field;
+    const slider = html("input", { type: "range", "aria-label": this.words.key(table, name) });
+    this.span(slider, field);
     const move = (done: boolean) => {
       this.lab.asked = "";
       this.lab.change({ [key]: Number(slider.value) }, { done });
@@ -151,6 +151,12 @@ class Fields {
     slider.addEventListener("change", () => move(true));
     row.append(slider);
     return slider;
+  }
+
+  /** Let a slider go over the range of a number. */
+  span(slider: HTMLInputElement, field: Field) {
+    const { from, to, step } = this.rangeOf(field);
+    Object.assign(slider, { min: from, max: to, step });
   }
 
   /** Show the value that counts, and why one that was typed does not. */
@@ -162,7 +168,11 @@ class Fields {
     const refused = lab.asked === field.key && lab.fault !== null && row.contains(this.asking);
     row.classList.toggle("refused", refused);
     why.hidden = !refused;
-    if (slider && typeof field.value === "number") slide(slider, field.value);
+    if (slider && typeof field.value === "number") {
+      const { min, max } = slider;
+      if (field.value < Number(min) || field.value > Number(max)) this.span(slider, field);
+      slide(slider, field.value);
+    }
     if (refused) {
       input.setAttribute("aria-invalid", "true");
       input.setAttribute("aria-describedby", why.id);

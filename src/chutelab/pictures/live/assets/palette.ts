@@ -193,9 +193,9 @@ class Palette {
     const scenery = new Scenery(view, this.words);
     scenery.draw(machine, scene);
     drawn.append(scenery.layer);
-    machine.releases.slice(0, MOST_BALLS).forEach(({ x, y, stream, t }, i) => {
+    machine.releases.slice(0, MOST_BALLS).forEach(({ x, y, stream, angle, t }, i) => {
       if (t > 0.5) return;
-      const corners = cornersOf(machine, i, { x, y }, 0), own = { class: `kind-${stream % 5}` };
+      const corners = cornersOf(machine, i, { x, y }, angle), own = { class: `kind-${stream % 5}` };
       drawn.append(corners.length ? svg("polygon", { ...own, points: corners.map(([u, v]) =>
         `${view.px(u)},${view.py(v)}`).join(" ") })
         : svg("circle", { cx: view.px(x), cy: view.py(y), ...own,

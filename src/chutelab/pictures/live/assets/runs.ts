@@ -60,7 +60,7 @@ class Runs {
   /** The row that was noted last. */
   latest = -1;
 
-  /** @param noted by row, kept by whoever keeps the answers
+  /** @param noted by row, kept with the answers
    * @param changed called when something was noted
    * @param label what a run of one's own is called */
   constructor(

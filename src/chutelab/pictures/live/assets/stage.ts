@@ -333,6 +333,8 @@ class Stage {
     context.setTransform(dense, 0, 0, dense, 0, 0);
     context.clearRect(0, 0, view.width, view.height);
     this.scenery.turn(t, recording.swings);
+    // Dashes round particles and joints go with them.
+    if (this.parts.length || this.pointed) this.drawOutline();
     const { least } = this;
     if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context);
     paintJoints(context, recording, t, view, this.colour("muted"));

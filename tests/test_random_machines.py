@@ -35,8 +35,8 @@ def test_what_swings_by_itself_does_so_in_both_engines(seed):
         assert off[1] < max(0.05, 0.6 * off[0]), one
 
 
-def drawn(seed):
-    """A ball that falls on to a surface that moves, or hangs, with or without a joint.
+def drawn(seed, *, tied=False):
+    """A ball that falls on to a surface that moves, or hangs, with or without a joint, or `tied`.
 
     One in three is a polygon of up to twenty faces, each of which is a body of its own there.
     """
@@ -54,7 +54,7 @@ def drawn(seed):
         3: {"hinge": random.uniform(-0.06, 0.06, 2).tolist(), "mass": random.uniform(0.05, 1.0),
             "spring": random.uniform(0.0, 3.0), "damper": random.uniform(0.0, 0.02)},
         4: {},
-    }[int(random.integers(5))]  # fmt: skip
+    }[3 if tied else int(random.integers(5))]  # fmt: skip
     pair = {"restitution": random.uniform(0.2, 0.9), "friction": random.uniform(0.0, 0.6)}
     board = {"name": "board", "from": (-half).tolist(), "to": half.tolist(), **motion, **pair}
     floor = {"name": "floor", "from": [-2.0, -0.6], "to": [2.0, -0.6], "restitution": 0.4}
@@ -67,7 +67,7 @@ def drawn(seed):
         "run": {"until": float(random.uniform(0.2, 0.45))},
     }  # fmt: skip
     kind = ""
-    if "hinge" not in motion and random.random() < 0.5:
+    if tied or ("hinge" not in motion and random.random() < 0.5):
         kind = ("string", "rod", "spring", "pin")[int(random.integers(4))]
         joint = {
             "from": [place[0] + random.uniform(-0.2, 0.2), place[1] + random.uniform(0.05, 0.2)]
@@ -94,6 +94,11 @@ def drawn(seed):
 @pytest.mark.parametrize("seed", seeds(4, 300))
 def test_a_ball_and_a_machine_go_the_same_way_in_both_engines(seed):
     goes_alike(drawn(seed))
+
+
+@pytest.mark.parametrize("seed", seeds(2, 100))
+def test_a_ball_on_a_joint_and_a_hinge_go_the_same_way_in_both_engines(seed):
+    goes_alike(drawn(seed, tied=True))
 
 
 def goes_alike(scene):

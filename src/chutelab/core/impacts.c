@@ -250,20 +250,15 @@ static void stop_turning(const Contact *c, double most, double arm, const double
 static void give(Contact *c, double normal) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double *J = c->impulse, u[3], v[3], given[3], most = c->friction * normal;
-    double arm = c->arm * normal, more[3] = {normal, 0, 0};
+    double arm = c->arm * normal, more[3] = {0, 0, 0};
     int tied = is_tied(c->i) || is_tied(c->j);
     relative(c, 0, u);
     J[0] = normal;
-    J[1] = more[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
-    if (c->hung) {
-        J[0] = more[0] = couple(c, normal / c->mass[0], u[1] + c->drift, J + 1);
-        more[1] = J[1];
-    }
-    if (tied) {
-        share_with_joints(c, normal / c->mass[0], u, J);
-        memcpy(more, J, 2 * sizeof(double));
-        arm = 0;
-    }
+    J[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
+    if (tied) share_with_joints(c, normal / c->mass[0], u, J);
+    else if (c->hung) J[0] = couple(c, normal / c->mass[0], u[1] + c->drift, J + 1);
+    memcpy(more, J, 2 * sizeof(double));
+    if (tied) arm = 0;
     J[2] = 0;
     push(c, more);
     relative(c, 0, v);

@@ -431,7 +431,11 @@ static int begin_step(void) {
     /* Impulses stand for half of the step before and half of this one. */
     double span = W.length_before + W.length;
     W.length_before = W.length;
-    if (W.joint_count) tie_joints();
+    if (W.joint_count) {
+        /* Strings that rattle may end it sooner. */
+        tie_joints();
+        h = W.step_end - W.t;
+    }
     do {
         W.again = span > 0 ? MIN((W.length + h) / span, MOST_AGAIN) : 1;
         for (int i = W.low; i < W.high; i++) {

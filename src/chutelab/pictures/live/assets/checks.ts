@@ -268,8 +268,6 @@ function* jointConflicts(scene: Scene, given: Given): Generator<Wrong> {
   if (count > 1 && !crowded) {
     yield [pathOf(given, "stream", 0, "interact"), streams[0].interact, "joint-meet"];
   }
-  const hinged = [...scene.plates, ...scene.surface].find(({ hinge }) => hinge);
-  if (hinged) yield [`${hinged.name ?? "plate"}.hinge`, hinged.hinge, "joint-hinge"];
 }
 
 /** Yields what the contact engine does not have with boxes and polygons. */

@@ -303,6 +303,7 @@ void touch(int owner, double t);
 
 /* grid.c */
 int list_near(double end);
+void list_again(int i);
 int enter_again(int i, double end);
 int reachable(int i);
 int surfaces_near(int i, const int **list);

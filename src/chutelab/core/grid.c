@@ -6,6 +6,8 @@
 /* Most cells that one box is entered in. A larger box (a fast disk among slow ones) is asked by all:
    the `W.wide_count` last entries of `W.found`, which has two for each disk. */
 #define MOST_CELLS 256
+/* Radii by which boxes are larger than they have to be: a blow may lead a disk so far from its way without another look. */
+#define SKIN 0.05
 /* Radii round the box of a disk for which the surfaces near it are listed. */
 #define ROOM 1.0
 
@@ -14,11 +16,11 @@ static int bucket(int ix, int iy) {
     return (int)((h ^ h >> 15) & (unsigned)(W.bucket_count - 1));
 }
 
-static void box_of(const Disk *d, double end, double *box) {
+static void box_of(const Disk *d, double end, double room, double *box) {
     double h = end - d->t, x = d->x + (d->vx + 0.5 * W.gx * h) * h;
     double y = d->y + (d->vy + 0.5 * W.gy * h) * h;
     /* Half of TOUCH for each of two disks, what the contact solver may change, and the sagitta. */
-    double margin = d->radius * (1 + TOUCH) + W.soft * h + 0.125 * W.g * h * h;
+    double margin = d->radius * (1 + TOUCH + room) + W.soft * h + 0.125 * W.g * h * h;
     box[0] = MIN(d->x, x) - margin;
     box[1] = MIN(d->y, y) - margin;
     box[2] = MAX(d->x, x) + margin;
@@ -92,18 +94,28 @@ static int query(int i, const double *box, Span s) {
     return n;
 }
 
+/* Put a pair behind those that may meet. */
+static void add_near(int n, int i, int j) {
+    for (int k = 2 * n; k < 2 * n + 2; k++) {
+        Disk *d = W.disks + (W.near[k] = k % 2 ? j : i);
+        W.near_links[k] = d->nears;
+        d->nears = k;
+    }
+}
+
 /* List all pairs that may meet before `end`; 0 if they are more than there is room for. */
 int list_near(double end) {
     double extent = 0;
     int live = 0;
-    W.near_count = W.cell_count = W.wide_count = 0;
+    W.near_count = W.later_count = W.cell_count = W.wide_count = 0;
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         d->wide = 0;
+        d->nears = -1;
         d->left = d->bottom = INFINITY;
         d->right = d->top = -INFINITY;
         if (!is_live(d)) continue;
-        box_of(d, end, &d->left);
+        box_of(d, end, W.interact ? SKIN : 0, &d->left);
         extent += MAX(d->right - d->left, d->top - d->bottom);
         live++;
     }
@@ -122,32 +134,48 @@ int list_near(double end) {
         for (int k = 0; k < n; k++) {
             if (!meet(i, W.found[k])) continue;
             if (W.near_count >= W.near_room) return 0;
-            W.near[2 * W.near_count] = W.found[k];
-            W.near[2 * W.near_count++ + 1] = i;
+            add_near(W.near_count++, W.found[k], i);
         }
         enter(i, span);
     }
     return 1;
 }
 
+/* Add the pairs that a disk may meet in, and that are not listed: its path has changed within the step. */
+void list_again(int i) {
+    const Disk *d = W.disks + i;
+    int n = W.interact && W.later_count >= 0 ? query(i, &d->left, span_of(&d->left)) : 0;
+    for (int k = 0; k < n; k++) {
+        int j = W.found[k], link = d->nears;
+        while (link >= 0 && W.near[link ^ 1] != j) link = W.near_links[link];
+        if (link >= 0 || !meet(i, j)) continue;
+        if (W.near_count + W.later_count >= W.near_room) {
+            W.later_count = -1;
+            return;
+        }
+        add_near(W.near_count + W.later_count++, j, i);
+    }
+}
+
 /* Enter a disk once more whose path changed within the step; 1 if it reaches further now. */
 int enter_again(int i, double end) {
     Disk *d = W.disks + i;
     double box[4];
-    box_of(d, end, box);
+    box_of(d, end, 0, box);
     if (box[0] >= d->left && box[1] >= d->bottom && box[2] <= d->right && box[3] <= d->top) return 0;
+    box_of(d, end, W.interact ? SKIN : 0, box);
     d->left = MIN(d->left, box[0]);
     d->bottom = MIN(d->bottom, box[1]);
     d->right = MAX(d->right, box[2]);
     d->top = MAX(d->top, box[3]);
     if (W.interact) enter(i, span_of(&d->left));
+    list_again(i);
     return 1;
 }
 
 /* Put the disks that disk i may meet in what is left of the step into `W.found`. */
 int reachable(int i) {
     int n = W.interact ? query(i, &W.disks[i].left, span_of(&W.disks[i].left)) : 0, kept = 0;
-    if (!W.passes) return n;
     for (int k = 0; k < n; k++)
         if (meet(i, W.found[k])) W.found[kept++] = W.found[k];
     return kept;

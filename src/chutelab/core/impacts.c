@@ -182,7 +182,9 @@ void foresee(int i) {
     else if (d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs)))
         foresee_surfaces(i, &due, &partner);
     if (d->mode == FREE) {
-        int n = reachable(i);
+        for (int link = W.later_count < 0 ? -1 : d->nears; link >= 0; link = W.near_links[link])
+            if (is_live(W.disks + W.near[link ^ 1])) foresee_pair(i, W.near[link ^ 1], &due, &partner);
+        int n = W.later_count < 0 ? reachable(i) : 0;
         for (int k = 0; k < n; k++) foresee_pair(i, W.found[k], &due, &partner);
     }
     expect(i, due, partner);
@@ -675,7 +677,7 @@ static void queue_up(int i, int *tail) {
    others it touches gives on what it got, first come first served. */
 void shock(int i, int j, double t) {
     int head = 0, tail = 0, budget = SHOCKS * W.contact_count;
-    W.moved_count = 0;
+    W.moved_count = W.woken = 0;
     W.shocks++;
     W.now = t;
     strike(i, j, t);
@@ -708,6 +710,7 @@ void shock(int i, int j, double t) {
         int m = W.moved[k];
         if (W.disks[m].mode == FREE) {
             enter_again(m, W.step_end);
+            if (W.woken) list_again(m);
             foresee(m);
         } else expect(m, INFINITY, ALARM);
     }

@@ -88,6 +88,7 @@ typedef struct {
     int rides;                  /* [in] the incoming belt carries it by adhesion */
     int goes_on;                /* [in] it was under way before: released wherever others are */
     int links;                  /* first of its lasting contacts in `World.links`, or -1 */
+    int nears;                  /* first of its places in `World.near`, or -1 */
     int before;                 /* first of those of the step before, or -1 */
     int queued, moved, jam;     /* marks of the shock, and of the latest jam */
     int jam_next;               /* the next disk in that jam, or -1 */
@@ -386,6 +387,7 @@ typedef struct {
     LightBody *light_bodies; /* (disks + 1) */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */
+    int *near_links;     /* (2 near) the next place in `near` of the same disk, or -1 */
     Cell *cells;
     int *heads;          /* first entry of each bucket of the grid */
     int *heap;           /* disks by their next events */
@@ -433,6 +435,9 @@ typedef struct {
     double accurate;     /* m/s; changes at which sweeps end */
     /* [out] */
     int knot_count, event_count, total_count, contact_count, near_count, earlier_count, swing_count;
+    int later_count;     /* pairs in `near` beyond `near_count`, of what may meet since its path changed within the step; -1:
+                            there is no room for them */
+    int woken;           /* whether the latest blow has woken any */
     int impact_count, step_count, solve_count, sweep_count;
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */

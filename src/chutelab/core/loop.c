@@ -203,6 +203,7 @@ static void separate(int i) {
     event_here(SEPARATION, i, W.ride_owner);
     take_off(i);
     enter_again(i, MAX(W.step_end, d->t));
+    list_again(i);
     if (d->ride_met >= 0) shock(i, -1 - d->ride_met, d->t);
 }
 

@@ -249,6 +249,7 @@ EXPORT int lay_out_world(void) {
 static void make_near_room(int room) {
     W.near_room = room;
     RESERVE(W.near, 2.0 * room);
+    RESERVE(W.near_links, 2.0 * room);
 }
 
 /* Of contacts those of the step before are kept. */

@@ -32,6 +32,7 @@ void wake(int i, double t) {
             continue;
         }
         was_moved(n);
+        W.woken = 1;
         double x = -0.5 * W.gx * left, y = -0.5 * W.gy * left;
         double entries[3] = {0, -d->mass * (x * (d->vx + 0.5 * x) + y * (d->vy + 0.5 * y)), 0};
         book(d->entries, 0, W.owner_count, entries);

@@ -10,6 +10,7 @@ ENGINE is contact or pymunk, by default what `auto` takes. The cases, all by def
     box     2,000 poured into a box 0.5 m wide, until they sleep
     hopper  1,000 grains of the scene `hopper`, of several sizes, run out through its gate
     board   the scene `galton`: 500 balls fall through 12 rows of pegs
+    drum    1,000 in a drum whose rim runs, which never sleep, for 1 s
     boxes   only if asked for: 1,000 into each of twenty boxes 0.3 to 0.6 m wide, until they sleep
 
 `stream` and `bed` run in turns with the bare loop, three times each; medians are told. The loop has
@@ -69,6 +70,18 @@ def box(width, count, speed):
     }  # fmt: skip
 
 
+DRUM = {
+    "title": "1,000 in a drum whose rim runs at 0.5 m/s",
+    "particle": {"radius": 0.004, "mass": 0.0021, "spin": True},
+    "surface": [
+        {"name": "drum", "center": [0.0, 0.0], "radius": 0.22, "from_deg": -180.0, "to_deg": 180.0,
+         "speed": 0.5, "restitution": 0.5, "friction": 0.5},
+    ],
+    "stream": {"count": 1000, "fill": [[-0.15, -0.15], [0.15, 0.15]], "velocity": [0.0, 0.0],
+               "interact": True, "restitution": 0.5, "friction": 0.3},
+    "run": {"until": 1.0},
+}  # fmt: skip
+
 LONG = ["stream.count=3200", "run.max_time=30"]
 BED = ["stream.count=1000", "particle.spin=true"]
 
@@ -79,6 +92,7 @@ CASES = {
     "box": lambda: scene.from_dict(box(0.5, 2000, 2.0)),
     "hopper": lambda: load("hopper", HOPPER),
     "board": lambda: load("galton"),
+    "drum": lambda: scene.from_dict(DRUM),
 }
 HOPPER = ["stream.count=1000", "stream.fill=[[-0.095, 0.08], [0.095, 1.19]]"]
 BOXES = {

@@ -308,7 +308,7 @@ def test_stream_presses_nobody_and_loses_no_joule():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("width", [0.18, 0.2, 0.25, 0.3])
+@pytest.mark.parametrize("width", np.linspace(0.15, 0.3, 20).round(4))
 def test_boxes_are_asleep_within_four_seconds(width):
     """A row that is jammed between the walls rattles in its place: it keeps nothing awake."""
     walls = {"name": "box", "points": [[-width, 3.0], [-width, 0.0], [width, 0.0], [width, 3.0]]}

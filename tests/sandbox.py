@@ -1,4 +1,8 @@
-"""Machines and mixtures drawn at random from all that a scene file can say of round particles."""
+"""Machines and mixtures drawn at random: of round particles, and of all that tips and swings.
+
+`tables` draws all that a scene file can say of round particles, `bodies` boxes, polygons and disks
+among what hangs, moves, opens and lets through, with joints, in air.
+"""
 
 import numpy as np
 
@@ -27,6 +31,23 @@ def tables(seed):
             build(from_dict(drawn))
         except SceneError:
             # A release inside a surface, a box too small, or a plate that is missed.
+            continue
+        return drawn
+
+
+def bodies(seed, *, few=False):
+    """Return a scene of boxes, polygons and disks that can be built; `few` is one or two of them.
+
+    Sizes are 14 to 130 mm, speeds up to 1 m/s; they fall by up to 1.2 m among up to four things
+    that stand, hang or move, or share points.
+    """
+    rng = np.random.default_rng(seed)
+    while True:
+        drawn = Bodies(rng, few=few).tables
+        try:
+            build(from_dict(drawn))
+        except SceneError:
+            # Two released in one place, or one in a surface.
             continue
         return drawn
 
@@ -287,3 +308,173 @@ class Drawing(Dice):
         surfaces += [table for table in ("incoming", "outgoing") if table in self.tables]
         between = [self.one_of(*self.named), self.one_of(*self.named, *surfaces)]
         self.tables["pair"] = [{"between": between, **self.values()}]
+
+
+class Bodies(Dice):
+    """One attempt at a scene of boxes, polygons and disks; with hinges or with joints."""
+
+    def __init__(self, rng, *, few):
+        super().__init__(rng)
+        self.few, self.hangs, self.rows, self.shift = few, self.chance(0.6), [], 0.0
+        self.tables = {"run": {"until": 0.35 if few else self.number(0.6, 1.0)}}
+        if self.chance(0.2):
+            self.tables |= self.one_of(
+                {"air_density": 1.2}, {"gravity": 2.0}, {"gravity_deg": 20.0}
+            )
+        self._kinds()
+        self._furniture()
+        self._streams()
+        if not self.hangs:
+            self._joints()
+
+    def values(self):
+        return {"restitution": self.one_of(0.0, 0.3, self.number(0.0, 0.9)),
+                "friction": self.one_of(0.0, 0.2, 1.0, self.number(0.0, 1.0))}  # fmt: skip
+
+    def near(self, x, y, reach):
+        return [x + self.number(-reach, reach), y + self.number(-reach, reach)]
+
+    def _kinds(self):
+        self.tables["particle"] = rows = []
+        for n in range(self.whole(1, 2 if self.few else 3)):
+            size = self.one_of(0.02, 0.05, 0.1) * self.number(0.7, 1.3)
+            row = {"name": f"kind-{n}", "mass": self.one_of(0.01, 0.1, 1.0), "spin": True}
+            shape = self.one_of("box", "box", "polygon", "polygon", "disk") if n else "polygon"
+            count = self.whole(3, 8)
+            turns = (np.arange(count) + self.rng.uniform(-0.3, 0.3, count)) * 2.0 * np.pi / count
+            points = 0.5 * size * np.array([np.cos(turns), np.sin(turns)]).T
+            if shape == "polygon" and self.chance(0.5):
+                row |= {"shape": shape, "points": points.tolist()}
+            elif shape == "disk":
+                row["radius"] = 0.5 * size
+            else:
+                row |= {"shape": "box", "size": [size, size * self.one_of(1.0, 1.0, 0.5, 0.2)]}
+            rows.append(row)
+
+    def _furniture(self):
+        self.tables["surface"] = self.rows
+        floor = self.one_of([[-1.0, -0.8], [1.0, -0.8]], [[-1.0, -0.5], [0.0, -0.8], [1.0, -0.5]])
+        way = [[-1.0, 1.5], *floor, [1.0, 1.5]]
+        self.rows.append({"name": "walls", "points": way, **self.values()})
+        for n in range(self.whole(1, 2 if self.few else 4)):
+            x = self.number(-0.15, 0.15) if self.few else 0.45 * (n - 1.5) + self.number(-0.1, 0.1)
+            y = -0.6 + 0.25 * self.whole(0, 2)
+            self._thing(f"thing-{n}", x, y)
+        shut = [row for row in self.rows if "turn" in row or "shake" in row or "travel" in row]
+        for row in shut:
+            if self.chance(0.2):
+                row["starts_when"] = {"touched": "walls"}
+
+    def _thing(self, name, x, y):
+        half = (
+            0.5 * self.number(0.1, 0.5) * np.array([np.cos(a := self.number(-0.6, 0.6)), np.sin(a)])
+        )
+        start, end = [x - half[0], y - half[1]], [x + half[0], y + half[1]]
+        course = self.one_of("line", "line", "line", "bowl", "peg", "bow", "vee", "shape")
+        row, radius = {"name": name, **self.values()}, self.number(0.06, 0.25)
+        if course == "line":
+            row |= {"from": start, "to": end}
+        elif course in ("bowl", "bow"):
+            begin, end = self.number(-30.0, 60.0), self.number(90.0, 210.0)
+            up = 180.0 if course == "bowl" else 0.0
+            row |= {"center": [x, y], "radius": radius, "from_deg": up + begin, "to_deg": up + end}
+        elif course == "peg":
+            row |= {"center": [x, y], "radius": 0.5 * radius, "from_deg": 0.0, "to_deg": 360.0}
+        elif course == "vee":
+            row["points"] = [start, [x, y - self.number(0.02, 0.15)], end]
+        else:
+            count = self.whole(3, 12)
+            turns = np.arange(count + 1) % count * 2.0 * np.pi / count + self.number(0.0, 1.0)
+            row["points"] = (
+                [x, y] + 0.6 * radius * np.array([np.cos(turns), np.sin(turns)]).T
+            ).tolist()
+        fate = self.one_of("still", "hangs", "hangs", "moves", "moves", "passes", "opens", "belt")
+        if fate == "hangs" and self.hangs:
+            row |= self._hinge(x, y, half)
+        elif fate == "moves":
+            row |= self._motion(x, y, start if course == "line" else None)
+        elif fate == "passes" and course in ("line", "vee", "bowl", "bow"):
+            row["passes"] = (
+                self.one_of("up", "down") if "center" not in row else self.one_of("in", "out")
+            )
+        elif fate == "opens":
+            row[self.one_of("opens_when", "closes_when")] = {"touched": "walls"}
+        elif fate == "belt":
+            row["speed"] = self.number(-1.0, 1.0)
+        self.rows.append(row)
+        if (
+            course == "bowl"
+            and self.chance(0.5)
+            and not {"hinge", "turn", "shake", "travel", "passes"} & {*row}
+        ):
+            # A line that begins where the arc ends.
+            turn = np.deg2rad(row["to_deg"])
+            tip = np.array([x, y]) + radius * np.array([np.cos(turn), np.sin(turn)])
+            on = tip + self.number(0.05, 0.2) * np.array([-np.sin(turn), np.cos(turn)])
+            self.rows.append({"name": f"{name}-on", "from": tip.tolist(), "to": on.tolist(),
+                              **self.values()})  # fmt: skip
+
+    def _hinge(self, x, y, half):
+        off = self.one_of(0.0, 1.0, -1.0, 0.2) * half
+        row = {"hinge": [x + off[0], y + off[1]], "mass": self.one_of(0.1, 1.0, 5.0)}
+        if self.chance(0.6):
+            row["stops_deg"] = [-self.number(0.0, 40.0), self.number(1.0, 40.0)]
+        if self.chance(0.4):
+            row |= {"spring": self.number(0.2, 5.0), "damper": self.number(0.0, 0.1)}
+        if self.chance(0.2):
+            row["motor"] = {
+                "speed_deg": self.number(-200.0, 200.0),
+                "torque": self.number(0.2, 2.0),
+            }
+        return row
+
+    def _motion(self, x, y, start):
+        to = self.near(*start, 0.1) if start else None
+        return self.one_of(
+            {"turn": self.number(-150.0, 150.0), "pivot": self.near(x, y, 0.05)},
+            {"shake": {"by": self.near(0.0, 0.0, 0.005), "frequency": self.number(1.0, 15.0)}},
+            {"travel": {"to": to, "at": 0.1, "in": 0.3}} if to else {"speed": 0.7},
+        )
+
+    def _streams(self):
+        kinds = [row["name"] for row in self.tables["particle"]]
+        self.tables["stream"] = rows = []
+        count, most = (self.whole(1, 2), 1) if self.few else (self.whole(1, 5), self.whole(1, 6))
+        x, step = (-0.75, 1.6 / count) if self.hangs else (-0.3, 0.15)
+        if self.few:
+            x, step = 0.0, 0.05
+        many = self.whole(0, count - 1)
+        for n in range(count):
+            kind = self.whole(0, len(kinds) - 1)
+            row = {"particle": kinds[kind], "at": [x + n * step, self.number(0.1, 0.4)],
+                   "velocity": self.near(0.0, 0.0, 1.0), "interact": True,
+                   **self.values()}  # fmt: skip
+            row |= {"omega": self.number(-20.0, 20.0)} if self.chance(0.4) else {}
+            if self.chance(0.6) and "shape" in self.tables["particle"][kind]:
+                row["angle_deg"] = self.one_of(45.0, self.number(-180.0, 180.0))
+            if n == many and most > 1:
+                # Equal ones, above each other.
+                up = 0.16 if self.chance(0.5) else 0.13
+                row |= {"count": most, "to": [row["at"][0], row["at"][1] + up * (most - 1)]}
+            rows.append(row)
+
+    def _joints(self):
+        streams = [row for row in self.tables["stream"] for _ in range(row.get("count", 1))]
+        count = len(streams)
+        for i in range(count):
+            if "count" in streams[i] or self.chance(0.4):
+                continue
+            kind = self.one_of("string", "rod", "spring", "pin")
+            x, y = streams[i]["at"]
+            row = {"particle": i, "from": [x + self.number(-0.3, 0.3), y + self.number(0.1, 0.4)]}
+            other = self.whole(0, count - 1)
+            if kind == "pin":
+                row["from"] = self.near(x, y, 0.05)
+            near = kind != "pin" or abs(streams[other]["at"][0] - x) < 0.2
+            if other != i and "count" not in streams[other] and near and self.chance(0.7):
+                row["other"] = other
+                if kind != "pin":
+                    del row["from"]
+            if kind == "spring":
+                row |= {"stiffness": self.one_of(5.0, 50.0), "damper": self.one_of(0.0, 0.1)}
+            self.tables.setdefault(kind, []).append(row)

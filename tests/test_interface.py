@@ -86,6 +86,9 @@ def test_mappings_ask_the_same_as_texts():
     ):
         with pytest.raises(InputError, match="is for the command line; in Python"):
             ask()
+    # What is wrong is named as in Python, not as an option.
+    with pytest.raises(InputError, match=r"^vary plate\.angl_deg: unknown key; did you mean"):
+        chutelab.sweep("perpendicular", {"plate.angl_deg": [0, 1]})
 
 
 def test_a_recording_answers_by_itself():

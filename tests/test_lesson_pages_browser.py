@@ -169,7 +169,9 @@ def noted(hand, lesson, step, kind):
         line = page.locator("table.runs tbody tr").nth(n)
         hand.press(line.locator(".set"))
         hand.play()
+        expect(button).not_to_have_attribute("aria-disabled", "true")
         hand.press(button)
+        expect(line).to_have_class(re.compile(r"\bnew\b"))
         values = page.evaluate(f"chutelab.lesson.kept.runs[{step_of(page)}][{n}].values")
         recording = run_of(lesson, step, row)
         for value, column in zip(values, step.columns, strict=True):
@@ -177,7 +179,6 @@ def noted(hand, lesson, step, kind):
                 expected = value_of(recording, column.value)
                 assert value is None or value == pytest.approx(expected, rel=1e-5, abs=1e-9)
                 assert (value is None) == (expected != expected)
-        assert "new" in line.get_attribute("class")
     for n in range(step.free):
         key = page.evaluate("[...chutelab.lesson.values.fields.keys()][0]")
         page.evaluate("(key) => chutelab.lesson.values.nudge(key, -3)", key)

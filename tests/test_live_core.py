@@ -133,6 +133,8 @@ def test_what_hangs_on_joints_moves_as_in_python():
     ]
     boxes = {**crowd, "particle": CORNERED[0]}
     scenes += [from_dict({**boxes, **joints}) for joints in ({"rod": apart}, {"pin": pins})]
+    hung = {**crowd, "surface": [{**LINE, **HANGS, "spring": 0.5}]}
+    scenes += [from_dict({**hung, **joints}) for joints in ({"string": apart}, {"pin": pins})]
     same_runs([load("cradle"), *scenes])
     lab = describe(load("perpendicular"))
     for table, row, key in (

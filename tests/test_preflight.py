@@ -3,7 +3,8 @@
 import os
 import re
 import time
-from math import cos, inf, pi, radians
+from dataclasses import replace
+from math import cos, inf, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from chutelab.checks.preflight import places, preflight, trial
 from chutelab.engines import pymunk
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
+from chutelab.results import REASONS
 from chutelab.results.recorder import StalledError
 from chutelab.results.sensors import readings
 from chutelab.results.wear import touched
@@ -121,7 +123,8 @@ def test_releases_that_wait_for_a_free_place_are_noticed():
     assert "of 5 particles tried, 4 particles waited for a free place" in advice.warning
     assert "0.024 s at most" in advice.warning
     assert advice.change.startswith("stream.rate = ")
-    assert list(advice.settings) == ["stream.rate"]
+    # 1 ms by the rate and the 24 ms of four, and a hundredth to spare.
+    assert advice.settings == {"stream.rate": pytest.approx(0.99 / 0.007, rel=4e-3)}
     assert applied("perpendicular", overrides, advice).advice == ()
 
 
@@ -354,6 +357,84 @@ def test_where_nothing_helps_it_says_what_happens():
     (advice,) = preflight(sc.parse(crossed)).advice
     assert advice.warning == "b: it crosses the drive pulley"
     assert advice.change == "if it is meant, leave it; the first contact wins"
+
+
+def test_of_many_pieces_and_crossings_some_are_told():
+    """A polyline of 12 pieces is told piece by piece; of 28 crossings of eight lines, 20 are."""
+    for pieces in (12, 13):
+        points = [[0.1 * k, 0.01 * (k % 2) - 1.0] for k in range(pieces + 1)]
+        told = built_of([{"name": "floor", "points": points}])
+        assert len(told) == (pieces if pieces == 12 else 1)
+    ways = [pi * n / 8.0 for n in range(8)]
+    star = [
+        {"name": f"s{n}", "from": [-cos(a), -sin(a) - 2.0], "to": [cos(a), sin(a) - 2.0]}
+        for n, a in enumerate(ways)
+    ]
+    *told, last = preflight(sc.from_dict({**DROP, "surface": star})).advice
+    assert [" crosses " in one.warning for one in told] == [True] * 20
+    assert last.warning == "8 further pairs of surfaces cross"
+
+
+DROP = {"stream": {"at": [0.0, 0.5], "velocity": [0.0, 0.0]}, "run": {"until": 0.2}}
+
+
+def built_of(surfaces):
+    """Return what is told of surfaces, piece by piece."""
+    names = {one["name"] for one in surfaces}
+    parts = preflight(sc.from_dict({**DROP, "surface": surfaces})).built
+    return [part for part in parts if part.name in names]
+
+
+def test_a_belt_that_is_too_short_gets_half_a_metre_beyond_the_landing(brief):
+    # It lands at 0.4546 m: half a metre more, up to a tenth, from its start at -2 m.
+    found = look("perpendicular", "outgoing.length=2.2").advice
+    (settings,) = [one.settings for one in found if "misses" in one.warning]
+    assert settings == {"outgoing.length": pytest.approx(3.0)}
+
+
+@pytest.mark.parametrize(("radius", "told"), [("1.9 mm", True), ("2.1 mm", False)])
+def test_particles_that_pymunk_does_not_resolve_are_told(radius, told, brief):
+    found = look("perpendicular", "run.engine=pymunk", f"particle.radius={radius}").advice
+    assert any("less than 2 mm" in one.warning for one in found) is told
+
+
+OWN = {"exact": 500.0, "contact": 20e3, "pymunk": 10e3}
+
+
+@pytest.mark.parametrize(
+    ("engine", "marks", "seconds"),
+    [
+        # All at one pace, the second half at another: their mean, by logarithms, 4 to 6.
+        ("contact", [(1.0, 0.1), (2.0, 0.4)], 4.0 * (5.0 / 4.0) ** 0.4),
+        ("pymunk", [(1.0, 0.1), (2.0, 0.4)], 4.0 * (5.0 / 4.0) ** 0.4),
+        # A tenth of the run, or less; paces that differ by less than three, or more.
+        ("contact", [(1.0, 0.055), (2.0, 0.11)], 2.0 / 0.11),
+        ("contact", [(1.0, 0.045), (2.0, 0.09)], None),
+        ("contact", [(1.0, 0.02), (2.0, 0.12)], (2.0 + 0.88 / 0.1) * (2.0 / 0.12 / 10.8) ** 0.4),
+        ("contact", [(1.0, 0.29), (2.0, 0.30)], None),
+    ],
+)
+def test_what_a_trial_tells_of_the_whole_run(engine, marks, seconds):
+    """75 MB of the program, what an engine sets up, 3.2 bytes for each that is written."""
+    stream = {**DROP["stream"], "to": [0.5, 0.5], "count": 5, "rate": 1e9, "interact": True}
+    scene = sc.from_dict({**DROP, "stream": stream, "run": {"until": 0.2, "engine": engine}})
+    whole = simulate(scene)
+    ended = np.full(5, REASONS.index("stopped"), dtype=whole.ended.dtype)
+    some = replace(whole, ended=ended)
+    tried = trial.Trial(some, 2.0, np.array([(0.0, 0.0), *marks]))
+    found = trial.effort(some.machine, tried, 0.5, 0)
+    assert found.at_least is (seconds is None)
+    if seconds is not None:
+        assert found.seconds == pytest.approx(0.5 + seconds, rel=1e-12)
+        written = 72.0 * len(some.knots) + some.events.nbytes
+        expected = 75e6 + 5.0 * OWN[engine] + 3.2 * seconds / 2.0 * written
+        assert found.memory == pytest.approx(expected, abs=1.0)
+
+
+def test_a_trial_takes_a_second_of_processor_time(monkeypatch):
+    monkeypatch.setattr(trial, "process_time", Clock(0.2))
+    scene = sc.load("stream", ["stream.count=30", "run.engine=pymunk", "run.until=2"])
+    assert preflight(scene).effort.how.startswith("a trial run of 1 s got through")
 
 
 def test_a_run_that_its_bound_stops_is_noticed():

@@ -23,7 +23,7 @@ STEPS = (1e-3, 1.0 / 30.0)
 """s; the default, and two frames of a game."""
 
 PATIENCE = 20.0
-"""s of wall time that one run may take."""
+"""s of processor time that one run may take."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Case:
     slow : tuple of str
         Engines on which it takes too long for the default run, at its finest step.
     patience : float
-        s of wall time that one run may take.
+        s of processor time that one run may take.
     """
 
     name: str

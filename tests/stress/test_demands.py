@@ -27,12 +27,14 @@ def test_a_scene_that_must_be_refused_and_one_that_must_not():
 def test_the_watchdog_ends_what_never_would(monkeypatch, calls):
     def hangs(_loaded, *, engine, progress):
         while True:
-            time.sleep(0.005)
+            end = time.process_time() + 0.005
+            while time.process_time() < end:
+                pass
             if calls:
                 progress(0.5)
 
     monkeypatch.setattr(runs, "judged", hangs)
-    begin = time.perf_counter()
-    with pytest.raises(runs.OverdueError, match=r"not done after 0\.05 s of wall time"):
+    begin = time.process_time()
+    with pytest.raises(runs.OverdueError, match=r"not done after 0\.05 s of processor time"):
         runs.findings(Case("hang", "test", HOP, patience=0.05), "exact", None)
-    assert time.perf_counter() - begin < 2.0
+    assert time.process_time() - begin < 2.0

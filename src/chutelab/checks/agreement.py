@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, product
 from math import inf, isfinite, log, nan, radians
 from types import MappingProxyType
 from typing import Final
@@ -55,8 +55,9 @@ some 1e-7, then sends the particle another way through the machine."""
 ORDERS: Final = {"contact": 2.0, "pymunk": 1.0}
 """Order at which the error of a stepped engine vanishes, at least."""
 
-REFINED: Final = {"contact": (1.0, 4.0, 16.0), "pymunk": (1.0, 2.0)}
-"""By what the scene's step is divided to show an order; a step of Pymunk takes long."""
+REFINED: Final = {"contact": ((1.0, 4.0, 16.0),), "pymunk": ((0.5, 1.0), (1.0, 2.0))}
+"""By what the scene's step is divided to show an order; finer where coarse steps show none, as a
+step of Pymunk takes long."""
 
 NEARBY: Final = (1.0, 0.85, 0.7)
 """Shares of a step; the largest error counts, since one alone may be small by luck, see
@@ -170,6 +171,10 @@ def agreement(
     return tuple(rows)
 
 
+Off = Callable[[Recording, Recording], tuple[float, str]]
+"""How far two runs are apart, and in what."""
+
+
 def _with_base(
     scene: Scene, name: str, recording: Recording, base: Recording, allowed: float | None,
     max_seconds: float, *, wide: bool,
@@ -187,28 +192,31 @@ def _with_base(
         what = "largest relative difference" if isfinite(error) else f"they differ in {which}"
         return Agreement(pair, what, error if isfinite(error) else None, allowed)
     runs = {scene.run.dt: recording}
-    found = _order(scene, name, runs, base, max_seconds, distance)
-    if wide and isinstance(found, tuple) and not found[1] >= ORDERS[name] - CHANCE[name]:
-        found = _order(scene, name, runs, base, max_seconds, whole_distance)
+    least = ORDERS[name] - CHANCE[name]
+    offs: list[Off] = [distance, *[whole_distance] * wide]
+    for parts, off in product(REFINED[name], offs):
+        found = _order(scene, name, parts, runs, base, max_seconds, off)
+        if isinstance(found, tuple) and found[1] >= least:
+            break
     if isinstance(found, str):
         return Agreement(pair, found)
     seen = ", ".join(f"{error:.0e}" for error in found[0])
-    return Agreement(pair, f"order ({seen})", found[1], ORDERS[name] - CHANCE[name], True)
+    return Agreement(pair, f"order ({seen})", found[1], least, True)
 
 
 def _order(
-    scene: Scene, name: str, runs: dict[float, Recording], base: Recording, max_seconds: float,
-    off: Callable[[Recording, Recording], tuple[float, str]],
+    scene: Scene, name: str, refined: tuple[float, ...], runs: dict[float, Recording],
+    base: Recording, max_seconds: float, off: Off,
 ) -> tuple[list[float], float] | str:  # fmt: skip
-    """Return the errors of an engine at its steps and their order; or why there is none.
+    """Return the errors of an engine at shares of its step and their order; or why there is none.
 
     `runs`, by step, are taken where they are there, and added to. An error that is not finite ends
     the search: its order is NaN, and those of longer steps are not looked for.
     """
-    ratio, least = REFINED[name][1], ORDERS[name] - CHANCE[name]
-    errors, found = [0.0 for _ in REFINED[name]], nan
+    ratio, least = refined[1] / refined[0], ORDERS[name] - CHANCE[name]
+    errors, found = [0.0 for _ in refined], nan
     # The longest steps last: as soon as one of their errors shows the order, larger ones show more.
-    for level, parts in reversed(list(enumerate(REFINED[name]))):
+    for level, parts in reversed(list(enumerate(refined))):
         for share in NEARBY:
             step = scene.run.dt / parts * share
             if found >= least and isfinite(found):

@@ -247,6 +247,7 @@ void swing_away(const Contact *c, int earlier, double *out);
 double swung_open(const Contact *c);
 void push_hinge(const Contact *c, const double *J);
 double hinge_share(const Contact *c);
+double coupled(const Contact *c);
 double couple(const Contact *c, double wanted, double slip, double *tangent);
 void strike_hinge(int mover, double t);
 void leave_struck(int mover);

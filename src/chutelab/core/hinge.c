@@ -106,6 +106,7 @@ static void note(const Mover *m, double t, double rate) {
 void prepare_hinge(Mover *m) {
     m->since = m->angle = m->rate = m->worked = m->stopped = m->damped = m->torque = m->pushed = 0;
     m->impulse[0] = m->impulse[1] = m->impulse[2] = 0;
+    m->acted = -INFINITY;
     m->stirs = m->solved = m->struck = 0;
     lay_path(m);
     note(m, 0, 0);
@@ -153,11 +154,16 @@ void begin_hinges(double t, double h) {
         bring(m, t);
         m->before = m->rate;
         m->drift = m->path[2] * h;
-        m->most = t >= m->begins ? 0.5 * (W.length_before + h) * m->motor[1] : 0;
+        /* Up to the middle of this step; the one before may have ended sooner than it was to. */
+        m->most = t >= m->begins ? MAX(t + 0.5 * h - MAX(m->acted, m->begins), 0) * m->motor[1] : 0;
+        if (t >= m->begins) m->acted = MAX(m->acted, t + 0.5 * h);
         follow_path(m, h, &angle, &rate, &change);
         for (int n = 0; n < 2; n++) {
             int touches = n ? m->angle >= m->stops[1] - AGAINST : m->angle <= m->stops[0] + AGAINST;
-            m->need[n] = touches ? (m->stops[n] - angle) / h : n ? INFINITY : -INFINITY;
+            /* As with joints, a short step takes back as small a share of what is beyond. */
+            double beyond = n ? MAX(m->angle - m->stops[n], 0) : MIN(m->angle - m->stops[n], 0);
+            double least = m->stops[n] + beyond * (1 - MIN(h / W.usual, 1));
+            m->need[n] = touches ? (least - angle) / h : n ? INFINITY : -INFINITY;
             m->impulse[n] *= touches ? share : 0;
         }
         m->impulse[2] = MIN(MAX(share * m->impulse[2], -m->most), m->most);
@@ -401,12 +407,15 @@ double hinge_share(const Contact *c) {
     return (J[0] * c->lever[0] + J[1] * c->lever[1] + J[2]) * c->turning;
 }
 
+/* What a hinge turns of a contact's normal impulse into slip, and of its tangential one into normal velocity, 1/kg. */
+double coupled(const Contact *c) { return c->lever[0] * c->lever[1] / hinge_of(c)->inertia; }
+
 /* The normal impulse that changes the normal velocity by so much, and the friction with it, of a contact with a
    hinge, whose impulses feel each other; `slip` is that before. Friction never gives energy: with Newton's
    restitution it might, where the blow itself turns the slip round (T. R. Kane and D. A. Levinson, Dynamics,
    1985, sec. 5.7); so it is no more than what brings the slip to the opposite of what it was. */
 double couple(const Contact *c, double wanted, double slip, double *tangent) {
-    double both = c->lever[0] * c->lever[1] / hinge_of(c)->inertia, normal = wanted * c->mass[0];
+    double both = coupled(c), normal = wanted * c->mass[0];
     *tangent = 0;
     for (int n = 0; n < ROUNDS; n++) {
         double most = c->friction * normal, free = slip + both * normal;

@@ -84,7 +84,8 @@ static double sweep(Contact *list, int count, int sweeps) {
             double change = press(c), rubbed = rub(c);
             worst = MAX(worst, MAX(change, rubbed));
         }
-        worst = MAX(worst, turn_hinges());
+        double turned = turn_hinges();
+        worst = MAX(worst, turned);
         W.sweep_count++;
         if (n == 0) first = worst;
         if (worst <= ENDS * W.pace) return worst;

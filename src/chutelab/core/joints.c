@@ -23,8 +23,15 @@
 /* Times that joints and contacts are solved for in turn; of the accuracy of the contacts. */
 #define TURNS 50
 #define AGREES 0.1
+/* m/s on Earth; what is left of that where there are FEW_CONTACTS at most. */
+#define FINE_TURNS 1e-10
+
+/* Of a step: of a shorter one velocities say more than lengths. */
+#define BRIEF 0.1
 
 static double missed;
+/* Whether lengths are as far from what they are to be as steps that ended in rounding are not. */
+static int is_rough;
 /* End of the step that the pull is found for, s. */
 static double pulled_to;
 
@@ -287,6 +294,7 @@ void pull_joints(double h) {
                 if (r->on) r->kick += r->off;
         }
         missed = worst > BAND ? worst : 0;
+        is_rough = worst > FINE;
         strings = 0;
         for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
             JointRow *r = W.joint_rows + j->row;
@@ -344,16 +352,29 @@ void cut_at_snaps(void) {
     }
 }
 
+/* How fast a joint is drawn apart, m/s. */
+static double rate_of(const JointRow *r) {
+    double sum = 0;
+    for (int end = 0; end < 2; end++) {
+        const Disk *d = at_end(2 * r->joint + end);
+        if (!d) continue;
+        sum += d->vx * r->e[2 * end] + d->vy * r->e[2 * end + 1] + r->lever[end] * d->spin;
+    }
+    return sum;
+}
+
+/* What a row gave to its particles in a step of length h that now ends, J: half of its impulse before the flight, half
+   after it, each times the mean of the velocities before and after it; from the velocities between both. */
+static double worked(const JointRow *r, double h) {
+    double falls = 0;
+    for (int end = 0; end < 2; end++)
+        if (at_end(2 * r->joint + end)) falls += h * (W.gx * r->e[2 * end] + W.gy * r->e[2 * end + 1]);
+    return r->kick * (2 * rate_of(r) - falls);
+}
+
 /* Give the other half of the step's pull, at its end, and book what springs gave and took. */
 void end_pull(void) {
     double h = W.step_end - W.t, d[4];
-    for (int i = W.low; i < W.high; i++) {
-        Disk *disk = W.disks + i;
-        for (int n = 0; disk->tie >= 0 && n < 3; n++) {
-            if (disk->mode == FREE) (&disk->vx)[n] += disk->tug[n];
-            disk->tug[n] = 0;
-        }
-    }
     for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
         JointRow *r = W.joint_rows + j->row;
         Disk *a = W.disks + j->particle, *b = j->other < 0 ? 0 : W.disks + j->other;
@@ -369,9 +390,18 @@ void end_pull(void) {
             j->kept[1] = kept;
             j->damped += lost;
             j->given += entries[0];
-        } else if (r->on && j->kind == PIN) entries[1] = -2 / h * (r->kick * moves[0] + r[1].kick * moves[1]);
-        else if (r->on) entries[1] = -2 * r->kick / h * grows;
+        } else
+            for (int n = 0; n < rows_of(j) && r->on; n++)
+                entries[1] -= h < BRIEF * W.usual || is_rough ? worked(r + n, h)
+                    : 2 / h * r[n].kick * (j->kind == PIN ? moves[n] : grows);
         if (entries[0] != 0 || entries[1] != 0) book(a->entries, b ? b->entries : 0, W.owner_count, entries);
+    }
+    for (int i = W.low; i < W.high; i++) {
+        Disk *disk = W.disks + i;
+        for (int n = 0; disk->tie >= 0 && n < 3; n++) {
+            if (disk->mode == FREE) (&disk->vx)[n] += disk->tug[n];
+            disk->tug[n] = 0;
+        }
     }
 }
 
@@ -397,17 +427,6 @@ static void aim_now(int taut) {
         between(j, 0, d);
         aim(j, d, d, 0);
     }
-}
-
-/* How fast a joint is drawn apart, m/s. */
-static double rate_of(const JointRow *r) {
-    double sum = 0;
-    for (int end = 0; end < 2; end++) {
-        const Disk *d = at_end(2 * r->joint + end);
-        if (!d) continue;
-        sum += d->vx * r->e[2 * end] + d->vy * r->e[2 * end + 1] + r->lever[end] * d->spin;
-    }
-    return sum;
 }
 
 /* Let go of strings that would push; return whether there is one. */
@@ -544,10 +563,10 @@ void end_blow(void) {
    is there (Kane, J. Appl. Mech. 51, 1984), there is no friction. `u` are normal velocity and slip before. */
 void share_with_joints(const Contact *c, double wanted, const double *u, double *J) {
     JointRow *rows = W.joint_rows, *end = rows + W.joint_row_count;
-    const double way[2][2] = {{c->nx, c->ny}, {c->ny, -c->nx}};
+    const double way[2][2] = {{c->nx, c->ny}, {c->ny, -c->nx}}, both = c->hung ? coupled(c) : 0;
     aim_now(1);
     do {
-        double feel[2][2] = {{1 / c->mass[0], 0}, {0, 1 / c->mass[1]}};
+        double feel[2][2] = {{1 / c->mass[0], both}, {both, 1 / c->mass[1]}};
         factor(1, 0);
         for (int n = 0; n < 2; n++) {
             for (JointRow *r = rows; r < end; r++) {
@@ -651,7 +670,7 @@ void agree_with_contacts(double h) {
                 double more = fabs(W.disks[i].tug[k] - W.disks[i].tugged[k]);
                 worst = MAX(worst, k < 2 ? more : has_corners(W.disks + i) ? more * W.disks[i].radius : 0);
             }
-        if (worst <= AGREES * W.accurate) return;
+        if (worst <= (W.contact_count > FEW_CONTACTS ? AGREES * W.accurate : FINE_TURNS * W.pace)) return;
         for (Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
             /* They begin anew with their impulses. */
             const double back[3] = {-c->impulse[0], -c->impulse[1], -c->impulse[2]};

@@ -619,8 +619,10 @@ static void judge_all(void) {
     L.hit_count = 0;
     for (int i = 0; i < L.particle_count && again; i++) find_hits(i);
     if (L.hit_count > L.hit_room) return;
-    /* What is at rest in a crowd turns nothing over: its heights are rounded all the same. */
-    double bound = L.energy_bound * L.energy + (L.interact ? EPS * All.weight * All.reach : 0);
+    /* What is at rest in a crowd turns nothing over: its heights are rounded all the same, and those of what joints
+       pull in each step, to and fro. */
+    double rounds = L.interact ? EPS * All.weight * All.reach * (L.joined ? sqrt(MAX(L.steps, 1)) : 1) : 0;
+    double bound = L.energy_bound * L.energy + rounds;
     tell_hits(1);
     tell_hits(0);
     judge_books(bound);

@@ -192,6 +192,7 @@ typedef struct {
     double impulse[3];      /* N m s; of its stops, and of its motor ... */
     double need[2], most;   /* rad/s, N m s; ... the least change that the stops ask for, and a bound */
     double drift;           /* rad/s; what springs and weight make of its speed by the middle of the step */
+    double acted;           /* s; up to when its motor has given what it gives */
     int surface;            /* [in] which moves */
     int stirs;              /* whether it moves in this step */
     int solved;             /* its impulses are of a step that begins now */

@@ -406,8 +406,10 @@ static int begin_step(void) {
     h = MIN(h, hop_time(W.disks + W.smallest, W.g + W.haste));
     for (int i = W.low; i < W.high && W.outline_count; i++) {
         const Disk *d = W.disks + i;
-        double press = W.g + W.haste + (has_corners(d) && d->mode == FREE ? whirl_of(d) : 0);
-        h = MIN(h, hop_time(d, press));
+        double press = W.g + W.haste, whirl = has_corners(d) && d->mode == FREE ? whirl_of(d) : 0;
+        h = MIN(h, hop_time(d, press + whirl));
+        /* What touches is to hop no faster than weight makes it. */
+        if (press > 0 && (d->supports || d->since == W.t)) h = MIN(h, hop_time(d, press) * press / (press + whirl));
     }
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     if (W.hinges) h = hinge_step(h);
@@ -431,7 +433,11 @@ static int begin_step(void) {
     /* Impulses stand for half of the step before and half of this one. */
     double span = W.length_before + W.length;
     W.length_before = W.length;
-    if (W.joint_count) tie_joints();
+    if (W.joint_count) {
+        /* Strings that rattle may end it sooner. */
+        tie_joints();
+        h = W.step_end - W.t;
+    }
     do {
         W.again = span > 0 ? MIN((W.length + h) / span, MOST_AGAIN) : 1;
         for (int i = W.low; i < W.high; i++) {

@@ -25,8 +25,8 @@
 /* Times the change at the end of the first round: sweeps that have not crawled to less in the last one
    press harder by as much in each, without end. */
 #define CRAWLS 0.5
-/* m/s on Earth; changes at which sweeps over a few contacts of what has corners end. */
-#define FINE_CORNERS 1e-11
+/* m/s on Earth; changes at which sweeps over a few contacts of what has corners or joints end. */
+#define FINE_FEW 1e-11
 /* ... and over many, of those of disks: a pile of boxes hangs together by more, and else does not come to rest. */
 #define CROWD_CORNERS 0.3
 /* Share of its bound up to which friction is not all used: it holds. */
@@ -219,7 +219,8 @@ static void sort_by_islands(void) {
    asked for, and by how much they break the law of energy: the kinetic energy after them, less that
    before, plus that of the change itself, is at most what moving surfaces give and what the contacts
    ask for. What is on its left is summed over disks, what is on its right over contacts. */
-static void check_solve(void) {
+static void check_solve(int again) {
+    static double last;
     double gained = 0, h = W.step_end - W.t;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
@@ -242,7 +243,9 @@ static void check_solve(void) {
         if (c->hung) gained += hinge_share(c);
     }
     if (W.swings_too) gained += gained_by_hinges();
-    W.gained += MAX(gained, 0);
+    /* What is solved for again counts once. */
+    W.gained += MAX(gained, 0) - (again ? last : 0);
+    last = MAX(gained, 0);
 }
 
 void solve_contacts(int again) {
@@ -251,7 +254,7 @@ void solve_contacts(int again) {
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
         double least = INFINITY, heaviest = 0;
-        int driven = 0, cornered = 0;
+        int driven = 0, cornered = 0, tied = 0;
         W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
@@ -261,6 +264,7 @@ void solve_contacts(int again) {
             driven |= presses(c);
             W.swings_too |= c->hung > 0;
             cornered |= c->cornered;
+            tied |= is_tied(c->i) || is_tied(c->j);
         }
         swings |= W.swings_too;
         /* A drive presses as hard as it must: there no spring would hold, so that it gives no more than
@@ -270,7 +274,8 @@ void solve_contacts(int again) {
             if (!driven) W.contacts[n].parts = INFINITY;
         }
         double accurate = W.accurate;
-        if (cornered) accurate = to - from <= FEW_CONTACTS ? FINE_CORNERS * W.pace : CROWD_CORNERS * accurate;
+        if ((cornered || tied) && to - from <= FEW_CONTACTS) accurate = FINE_FEW * W.pace;
+        else if (cornered) accurate = CROWD_CORNERS * accurate;
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), W.sweeps,
                            PLAIN, accurate, W.skip * least);
@@ -278,6 +283,6 @@ void solve_contacts(int again) {
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);
     W.swings_too = swings;
-    check_solve();
+    check_solve(again);
     W.solve_count++;
 }

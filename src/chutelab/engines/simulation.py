@@ -276,11 +276,8 @@ def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
 
 def unjoined(machine: Machine) -> str:
     """Return why the contact engine cannot run a machine with joints, or nothing."""
-    scene = machine.scene
     if machine.count > 1 and not machine.interact:
         return "several particles that do not meet hang on joints"
-    if scene.hinges:
-        return "joints and hinges are in one scene"
     for joint in machine.joints:
         reach = joint.reach(machine.releases.position)
         if joint.kind == "string" and reach > (1.0 + TAUT) * joint.length:

@@ -181,18 +181,22 @@ def lay(
     movers : tuple of Mover
         How surfaces move; of a family none does.
     """
-    scene, numbers = scenes.scene, row(scenes, friction)
+    scene, plan = scenes.scene, module.structs["Plan"]
     shape = (len(scenes),) if isinstance(scenes, Family) else ()
-    plan, every = module.structs["Plan"], shape[0] if shape else 1
-    plan.members, plan.width = every, len(numbers)
-    for name, count in counts(scene).items():
-        setattr(plan, name, count)
-    module.work("lay_out_plan")
-    rows = module.array("rows", REAL, every * len(numbers), of="Plan").reshape(every, -1)
-    varies = [n for n, number in enumerate(numbers) if isinstance(number, np.ndarray)]
-    rows[:] = [nan if n in varies else number for n, number in enumerate(numbers)]
-    for column in varies:
-        rows[:, column] = numbers[column]
+    every = prod(shape)
+    if shape:
+        numbers = row(scenes, friction)
+        plan.members, plan.width = every, len(numbers)
+        for name, count in counts(scene).items():
+            setattr(plan, name, count)
+        module.work("lay_out_plan")
+        rows = module.array("rows", REAL, every * len(numbers), of="Plan").reshape(every, -1)
+        varies = [n for n, number in enumerate(numbers) if isinstance(number, np.ndarray)]
+        rows[:] = [nan if n in varies else number for n, number in enumerate(numbers)]
+        for column in varies:
+            rows[:, column] = numbers[column]
+    else:
+        hand_over(module, scene)
     module.work("build")
     plan = module.structs["Plan"]
 

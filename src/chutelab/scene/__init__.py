@@ -19,6 +19,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, lru_cache
 from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final
@@ -89,6 +90,7 @@ class About:
     path: Path
 
 
+@cache
 def shipped() -> dict[str, Path]:
     """Return the files of the shipped scenes by name, in alphabetical order.
 
@@ -281,6 +283,18 @@ def parse(text: str, source: str = "<scene>", overrides: Overrides = ()) -> Scen
     SceneError
         With all faults, or with the place of a syntax error.
     """
+    changes = list(_each(overrides))
+    return from_dict(_document(text, source), source, changes) if changes else _sound(text, source)
+
+
+@lru_cache(16)
+def _sound(text: str, source: str) -> Scene:
+    """Return the scene of a text as it stands; a scene never changes, so one is enough."""
+    return from_dict(_document(text, source), source)
+
+
+def _document(text: str, source: str) -> dict[str, Any]:
+    """Read TOML."""
     # For a key of many parts tomllib takes time with their number squared.
     if any(part.count(".") > _MOST_DOTS for part in re.split(r"[][{},=\n]", text)):
         raise SceneError(source, "not TOML to be read: a key is nested too deep")
@@ -293,7 +307,7 @@ def parse(text: str, source: str = "<scene>", overrides: Overrides = ()) -> Scen
         # thousands of digits, arrays nested a thousand deep.
         text = "not TOML to be read: a value is too large or nested too deep"
         raise SceneError(source, text) from None
-    return from_dict(document, source, overrides)
+    return document
 
 
 def from_dict(

@@ -44,14 +44,14 @@ class Vary:
 
     key: str  # full path of the key, such as plate.angle_deg or surface.hood.speed
     values: tuple[float, ...]  # in the order they are gone through; in the key's unit
-    # what messages call it; by default as on the command line
+    # what messages call it; on the command line as it was typed
     typed: str = field(default="", compare=False)
     # the unit that was written with the values, "" for none; `quantity` refuses a wrong one
     unit: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         if not self.typed:
-            object.__setattr__(self, "typed", f"--vary {self.key}=...")
+            object.__setattr__(self, "typed", f"vary {self.key}")
         if not self.values:
             raise InputError("at least one value is needed", self.typed)
         if not all(isfinite(value) for value in self.values):
@@ -87,12 +87,12 @@ def varied(varies: Varied, kind: type[Vary]) -> list[Vary]:
 
     It is given as such a list, or as values by key: numbers, or texts with a unit.
     """
-    refuse_texts(varies, "--vary", '{"plate.angle_deg": [0, 30, 60]}')
+    refuse_texts(varies, "vary", '{"plate.angle_deg": [0, 30, 60]}')
     if not isinstance(varies, Mapping):
         return list(varies)
     found = []
     for key, values in varies.items():
-        typed = f"--vary {key}=..."
+        typed = f"vary {key}"
         if isinstance(values, str) or not hasattr(values, "__len__"):
             raise InputError(NUMBERS, typed)
         read, unit = numbers(typed, [str(value) for value in plain(values)], NUMBERS)
@@ -102,9 +102,9 @@ def varied(varies: Varied, kind: type[Vary]) -> list[Vary]:
 
 
 def numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, ...], str]:
-    """Return numbers, with or without unit, in the SI unit, and which that is; "" if none is there.
+    """Return numbers, with or without unit, in the SI unit, and that unit; "" without one.
 
-    Raises an `InputError` if one is none; it says `form`, what is allowed.
+    Raises an `InputError` if one is no number; it says `form`, what is allowed.
     """
     values, units = [], set()
     for part in parts:
@@ -132,7 +132,7 @@ class Quantity:
 
 
 def quantity(scene: Scene, vary: Vary) -> Quantity:
-    """Return what a varied key of a scene is; an `InputError` if none, or one without a number."""
+    """Return what a varied key of a scene is; an `InputError` if it is unknown, or no number."""
     document = plain(to_dict(scene))
     faults, _ = apply(document, [Override(vary.key, plain_number(vary.values[0]))])
     if faults:

@@ -170,12 +170,12 @@ def solve(
     47.828951
     """
     scene = load(scene)
-    refuse_texts(target, "--target", '{"landing.vx": 1.0}')
+    refuse_texts(target, "target", '{"landing.vx": 1.0}')
     pairs = list(target.items()) if isinstance(target, Mapping) else list(target)
     if not pairs:
-        raise InputError("name at least one, such as landing.vx=outgoing.speed", "--target")
+        raise InputError("name at least one, such as landing.vx=outgoing.speed", "target")
     wishes = [wish(scene, name, value) for name, value in pairs]
-    last = "--target {}={}".format(*pairs[-1])
+    last = "target {}={}".format(*pairs[-1])
     if len({left.key for left, _ in wishes}) < len(wishes):
         raise InputError("this quantity has a target already", last)
     if minimize and maximize:

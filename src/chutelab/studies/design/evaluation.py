@@ -162,7 +162,7 @@ def target(
 
     Raises an `InputError` if one of them is unknown, or their units differ.
     """
-    typed = typed or f"--target {name}={value}"
+    typed = typed or f"target {name}={value}"
     left = measured(scene, name, typed)
     try:
         number, unit = read_size(value) if isinstance(value, str) else (value, "")

@@ -20,6 +20,7 @@ from chutelab.results.ledger import ledger
 from cores import Core
 from crowds import crowd, hop_step
 from machines import SLIDES, box, over_the_pulley, ramp, scene_of
+from packings import WIDTHS, packed
 from references import (
     first_impacts,
     henderson,
@@ -233,7 +234,7 @@ def feeder(count=60):
 
 
 @pytest.mark.slow
-def test_whose_place_is_taken_waits_for_it():
+def test_what_has_its_place_taken_waits_for_it():
     # One leaves the place free for the next when it is 2 r away: |v t + g t²/2| = 2 r.
     machine = feeder()
     recording = run(machine)
@@ -249,7 +250,7 @@ def test_whose_place_is_taken_waits_for_it():
     assert np.median(gaps) <= clear + 1.01 * hop_step(machine, machine.dt)
 
 
-def test_who_finds_no_place_to_the_end_is_never_released():
+def test_what_finds_no_place_to_the_end_is_never_released():
     machine = scene_of(
         surface=[{"name": "cup", "points": [[-0.03, 0.08], [-0.03, 0.0], [0.03, 0.0],
                                             [0.03, 0.08]], "restitution": 0.0}],
@@ -324,7 +325,7 @@ def test_boxes_are_asleep_within_four_seconds(width):
 
 
 @pytest.mark.parametrize("friction", [0.2, 0.5])
-def test_nobody_settles_on_the_belt_that_throws(friction):
+def test_none_settles_on_the_belt_that_throws(friction):
     # At the belt's speed on the incoming belt it has no slip, and will still be thrown off.
     machine = build(scene.load("stream", [f"incoming.friction={friction}", "stream.count=50"]))
     recording = run(machine)
@@ -337,10 +338,25 @@ def test_nobody_settles_on_the_belt_that_throws(friction):
 
 
 @pytest.mark.parametrize("name", ["galton", "rock-box"])
-def test_in_a_crowd_who_parts_from_a_surface_does_so_on_its_track(name):
+def test_in_a_crowd_what_parts_from_a_surface_does_so_on_its_track(name):
     recording = run(build(scene.load(name, ["stream.count=40"])))
     events = recording.events[recording.events["kind"] == Kind.SEPARATION]
     assert len(events) > 40
     places = np.stack([recording.at([e["t"]])[0][0, e["particle"]] for e in events])
     # NaN, before the release, is no place.
     assert np.hypot(*(places - events["position"]).T).max() < 1e-3 * 0.003
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", WIDTHS)
+def test_disks_pack_as_with_the_solver_run_to_convergence_at_a_quarter_of_the_step(width):
+    """Mean height, share covered and contacts per disk of ten runs, all asleep in the end."""
+    shipped, finest = (
+        np.array([packed(width, seed, level) for seed in range(10)])
+        for level in ("shipped", "solved, dt/4")
+    )
+    error = np.sqrt(sum(rows[:, :3].var(axis=0, ddof=1) / len(rows) for rows in (shipped, finest)))
+    off = (shipped - finest)[:, :3].mean(axis=0)
+    assert (np.abs(off) <= 3.0 * error).all(), off / error
+    assert error[0] <= 0.01 * finest[:, 0].mean(), "heights are told to a hundredth"
+    assert shipped[:, 5].min() == finest[:, 5].min() == 1.0

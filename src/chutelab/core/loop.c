@@ -656,7 +656,7 @@ static int begin_part(void) {
         if (d->radius < W.disks[W.smallest].radius) W.smallest = i;
         d->left = d->bottom = INFINITY;
         d->right = d->top = -INFINITY;
-        d->before = d->links = -1;
+        d->before = d->links = d->nears = -1;
         d->inv_mass = 1 / d->mass;
         d->inv_inertia = d->inertia > 0 ? 1 / d->inertia : 0;
         d->heap_place = -1;

@@ -129,6 +129,17 @@ def rows_of(name, *overrides):
     return {", ".join(row.pair): row for row in agreement(scene.load(name, overrides))}
 
 
+@pytest.mark.parametrize(("count", "alone"), [(10, False), (11, True)])
+def test_of_more_than_ten_that_do_not_meet_pymunk_runs_the_first_alone(count, alone, monkeypatch):
+    def quick(drawn, engine, **options):
+        del engine, options
+        return simulate(drawn, engine="exact")
+
+    monkeypatch.setattr("chutelab.checks.agreement.answer", quick)
+    found = verify(scene.load("stream-independent", [f"stream.count={count}"]))
+    assert ("runs particle 0 alone" in found.skipped.get("pymunk", "")) is alone
+
+
 def test_where_all_contacts_are_blows_the_engines_agree_to_what_each_promises():
     rows = rows_of("perpendicular")
     assert set(rows) == {

@@ -1,7 +1,7 @@
 """The event-driven engine against formulas and differential equations written here."""
 
 from dataclasses import replace
-from math import cos, hypot, sin, sqrt
+from math import cos, hypot, log, sin, sqrt
 
 import numpy as np
 import pytest
@@ -295,6 +295,21 @@ def test_a_run_without_an_end_is_stopped_and_keeps_what_it_recorded(monkeypatch)
     assert recording.ended[0] == 0
     assert recording.track(0)[-1]["t"] == end.value.t
     assert ledger(recording).relative_residual < 1e-12
+
+
+@pytest.mark.slow
+def test_a_run_without_an_end_is_stopped_after_half_a_million_events():
+    floor = {**FLOOR, "restitution": 1.0, "friction": 0.0}
+    with pytest.raises(StalledError, match="500000 events, and no end of them"):
+        thrown([0.0, 1e-6], [0.0, 0.0], floor, until=500_001.0 * 2.0 * sqrt(2.0 * 1e-6 / G))
+
+
+def test_a_lively_particle_comes_to_rest_before_that():
+    """Each of n bounces keeps 0.999 of the speed, from sqrt(2 g h) down to 1e-9 m/s."""
+    recording = thrown([0.0, 0.1], [0.0, 0.0], {**FLOOR, "restitution": 0.999}, until="settled")
+    assert recording.ended_by("settled").all()
+    bounces = log(sqrt(2.0 * G * 0.1) / 1e-9) / -log(0.999)
+    assert recording.contacts == pytest.approx(bounces, rel=0.01)
 
 
 def test_a_particle_that_hardly_gets_on_is_stopped(monkeypatch):

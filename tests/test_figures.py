@@ -63,6 +63,13 @@ def test_the_printed_form_is_what_table_1_was_made_from(found):
         np.testing.assert_allclose(columns["v2', m/s, as-printed"], after, rtol=1e-12)
 
 
+@pytest.mark.parametrize("number", [6, 7])
+def test_its_scene_has_the_energy_of_the_first_radius(found, number):
+    (scene,) = found[number].scenes.values()
+    energy = found[number].columns["ΔE_k, mJ, corrected, d_okr = 0.5 m"]
+    assert 1000.0 * chutelab.theory.predict(scene).dEk == pytest.approx(energy[0], rel=1e-12)
+
+
 @pytest.mark.parametrize("number", [11, 12, 13])
 def test_the_engine_runs_the_corrected_paths(found, number):
     for case, scene in zip(CASES[number], found[number].scenes.values(), strict=True):

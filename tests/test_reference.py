@@ -83,6 +83,22 @@ def test_bounces_end_after_2u_over_g_1_minus_epsilon():
     assert REASONS[found.ended[0]] == "settled"
 
 
+@pytest.mark.parametrize(("gap", "falls"), [(1e-11, True), (1e-13, False)])
+def test_what_is_a_trillionth_of_a_metre_from_a_surface_touches_it(gap, falls):
+    recording = run(thrown((0.0, 0.01 + gap), (0.0, 0.0), 0.01, floor(restitution=0.5)))
+    struck = recording.select(Kind.IMPACT)["t"]
+    assert len(struck) > 0 if falls else not len(struck)
+    if falls:
+        assert struck[0] == pytest.approx(sqrt(2.0 * gap / G), rel=1e-6)
+
+
+@pytest.mark.parametrize(("speed", "slips"), [(3e-9, True), (3e-11, False)])
+def test_what_slips_by_less_than_a_ten_billionth_of_a_metre_a_second_sticks(speed, slips):
+    recording = run(thrown((0.0, 0.01), (speed, 0.0), 0.01, floor()))
+    (stick,) = recording.select(Kind.STICK)["t"]
+    assert stick == pytest.approx(speed / (0.3 * G) * slips, rel=1e-6)
+
+
 def test_round_the_end_of_a_belt_the_surface_runs_on_along_the_rim():
     """A disk that falls on the very end at 45° meets v along (n_y, -n_x), n the contact normal."""
     speed, r, mu = 3.0, 0.01, 0.2

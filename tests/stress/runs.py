@@ -124,6 +124,7 @@ ASIDE = {
     "bounces off something": "a run does not compare its table of events with its tracks",
     "friction of the pair": "a run does not compare its table of events with its tracks",
     "rebound of the pair": "a run does not compare its table of events with its tracks",
+    "loads": "a run does not compare what its surfaces bear with its tracks",
     "released into room": "a run does not compare its table of events with its tracks",
 }
 """Laws of `chutelab.checks.stress` that a run does not judge itself by, and why: what breaks only

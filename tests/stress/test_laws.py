@@ -40,6 +40,18 @@ def test_a_number_that_is_moved_breaks_its_law(law, name, field, row, amount, fi
     assert figure is None or bad.figure == pytest.approx(figure, rel=1e-3)
 
 
+def test_loads_that_are_off_by_a_hundred_millionth_are_told():
+    borne = merged(HOP, {"run": {"loads": 0.1}})
+    size = float(np.abs(evidence(borne).recording.impulses["force"]).sum())
+    # The figure is a share of these and of m |v| at the start, which is less.
+    good, bad = (
+        laws.loads(evidence(borne, impulses=adder("force", 4, off * size))) for off in (0.0, 1e-8)
+    )
+    assert good.holds
+    assert 4e-9 < bad.figure <= 1e-8
+    assert not bad.holds
+
+
 def test_a_particle_without_a_track_is_lost():
     def forget(offsets):
         offsets[1] = 0

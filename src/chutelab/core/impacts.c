@@ -5,6 +5,9 @@
 
 /* Restitution at which JAM blows take half of what does not slip: a disk of more is not jammed by them. */
 #define LASTING 0.9914
+/* Overlap, in radii, up to which an approach that is slow enough to be a lasting contact's may lead by the end of the
+   step: what is supported is left to the next step at so much, since a blow on a pile has no end of blows. */
+#define LATE 1e-3
 
 /* ------------------------------------------------------------------ the next event of each disk */
 
@@ -87,6 +90,13 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     return MAX(least, MIN(skip * pow(GROW, MIN(impacts - many, 1000)), most));
 }
 
+/* The same of two disks of a crowd at t: of those that rest on something also what is late, see LATE. */
+static double left_between(const Disk *a, const Disk *b, double radius, int sunk, double t) {
+    double least = left_over(a, MAX(a->impacts, b->impacts), -1, radius, sunk);
+    if (sunk || !W.interact || !(a->supports || b->supports) || !(t < W.step_end)) return least;
+    return MAX(least, MIN(W.soft, LATE * radius / (W.step_end - t)));
+}
+
 /* When particle i meets j, of which one has corners, in what is left of the step after a time. */
 static RARELY double meet_cornered(int i, int j, double from) {
     int first = has_corners(W.disks + i) ? i : j, other = first == i ? j : i;
@@ -114,7 +124,7 @@ static void foresee_pair(int i, int j, double *due, int *partner) {
     double t = W.now + meet_disk(x, y, u, v, reach, W.step_end - W.now, &approach);
     if (!(t < *due && t < W.step_end)) return;
     int sunk = x * x + y * y < square(reach - SUNK * small);
-    if (approach > left_over(a, MAX(a->impacts, b->impacts), -1, small, sunk)) {
+    if (approach > left_between(a, b, small, sunk, t)) {
         *due = t;
         *partner = j;
     }
@@ -650,7 +660,7 @@ static int struck_too(const Contact *c, double t, int *j) {
     double x = a->x - b->x, y = a->y - b->y, d = sqrt(x * x + y * y), r = MIN(a->radius, b->radius);
     double approach = -(x * (a->vx - b->vx) + y * (a->vy - b->vy)) / d;
     return d < a->radius + b->radius + TOUCH * r
-        && approach > left_over(a, MAX(a->impacts, b->impacts), -1, r, d < a->radius + b->radius - SUNK * r);
+        && approach > left_between(a, b, r, d < a->radius + b->radius - SUNK * r, t);
 }
 
 static void queue_up(int i, int *tail) {

@@ -140,6 +140,8 @@ def _hinges(recording: Record, figures: Any) -> list[Broken]:
     step, is judged by ΔE alone, roughly.
     """
     told = list[Broken]()
+    if not recording.machine.movers:
+        return told
 
     def must(law: str, surface: int, amount: float, bound: float, unit: str = "J") -> None:
         if not amount <= bound:

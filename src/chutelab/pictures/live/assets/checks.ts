@@ -199,9 +199,6 @@ function* beltConflicts(scene: Scene): Generator<Wrong> {
     yield ["gravity_deg", scene.gravity_deg, "upright"];
   }
   if (outgoing?.drop_from === "impact") yield ["outgoing.drop_from", "impact", "drop-from-impact"];
-  if (outgoing === null && scene.run.until === "landed") {
-    yield ["run.until", "landed", "needs-outgoing"];
-  }
 }
 
 /** Yields surfaces with points too near to each other, and the one with which they are too many. */
@@ -238,10 +235,6 @@ function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
   const { streams, crowded, run } = scene, movers = moversOf(scene);
   const count = streams.reduce((sum, stream) => sum + stream.count, 0);
   const waits = triggersOf(scene).length > 0;
-  const bonds = scene.pair.findIndex(({ bond_number: number }) => number > 0);
-  if (bonds >= 0 && scene.gravity === 0) {
-    yield [`pair[${bonds}].bond_number`, scene.pair[bonds].bond_number, "weightless"];
-  }
   const clings = scene.pair.findIndex(clinging);
   const isOneSided = scene.surface.some(({ passes }) => passes);
   if (run.engine === "exact" && (movers.length || crowded || waits || isOneSided)) {
@@ -271,13 +264,6 @@ function* jointConflicts(scene: Scene, given: Given): Generator<Wrong> {
   const { joints, streams, crowded, run } = scene;
   if (!joints.length) return;
   const count = streams.reduce((sum, stream) => sum + stream.count, 0);
-  for (const { kind, given: row, particle, other } of joints) {
-    const n = listOf(given[kind]).indexOf(row);
-    for (const [key, number] of [["particle", particle], ["other", other ?? 0]] as const) {
-      if (number >= count) yield [`${kind}[${n}].${key}`, number, "range", { low: 0, high: count - 1 }];
-    }
-    if (other === particle) yield [`${kind}[${n}].other`, other, "same-particle"];
-  }
   if (run.engine === "exact") yield ["run.engine", run.engine, "not-exact"];
   if (count > 1 && !crowded) {
     yield [pathOf(given, "stream", 0, "interact"), streams[0].interact, "joint-meet"];
@@ -325,8 +311,9 @@ function* kindConflicts(scene: Scene, given: Given): Generator<Wrong> {
 
 /** Yields what the rules that Python has too find within a row of a table. */
 function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<Wrong> {
+  const count = scene.streams.reduce((sum, stream) => sum + stream.count, 0);
   const tables: Record<string, any[]> = {
-    plate: scene.plates, particle: scene.particles, stream: scene.streams,
+    run: [scene.run], plate: scene.plates, particle: scene.particles, stream: scene.streams,
     surface: scene.surface, conveyor: scene.conveyor, sensor: scene.sensor, pair: scene.pair,
     ...Object.fromEntries(JOINTS.map((table) =>
       [table, scene.joints.filter(({ kind }) => kind === table)])),
@@ -338,6 +325,8 @@ function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<
         abs: Math.abs, radians: (angle: number) => angle * RADIANS, near: tooNear, run: scene.run,
         number: Number.isFinite, given: has(row.given), has: has(given), sound: () => true,
         before: (key: string) => rows.slice(0, n).some((one) => has(one.given)(key)),
+        value: (key: string) => row[key], gravity: scene.gravity, count,
+        kind: scene.particles[table === "stream" ? scene.kinds[n] : 0],
       };
       for (const [keys, when, text, other] of rules[table] ?? []) {
         const wrong = keys.find((key) => valueOfTree(when, (name) =>
@@ -352,11 +341,9 @@ function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<
 
 /** @param n of the stream */
 function* streamConflicts(scene: Scene, given: Given, n: number): Generator<Wrong> {
-  const stream = scene.streams[n], { outline, spin } = scene.particles[scene.kinds[n]];
+  const stream = scene.streams[n];
   const path = (key: string) => pathOf(given, "stream", n, key);
   if (!Number.isFinite(stream.rate)) yield [path("rate"), stream.given.rate, "form"];
-  if (stream.omega && !spin) yield [path("omega"), stream.omega, "needs-spin"];
-  if (stream.angle_deg && !outline.length) yield [path("angle_deg"), stream.angle_deg, "other-shape"];
   const size = 2.0 * scene.particles[scene.kinds[n]].radius;
   if (stream.width !== undefined && stream.width < size) {
     yield [path("width"), stream.width, "range", { low: size, high: 1e6 }];

@@ -295,7 +295,7 @@ _ENGINES = ("exact", "contact", "pymunk")
 
 
 def alike(recording: Record) -> bool:
-    """Tell whether all is left to Chipmunk, in steps that are all alike."""
+    """Tell whether Chipmunk finds and solves all contacts, in equal steps."""
     m = recording.machine
     return recording.engine == "pymunk" and (
         m.interact

@@ -198,8 +198,9 @@ def test_a_key_takes_the_values_of_its_range_and_no_others(line):
 # The shipped scenes.
 
 SHIPPED = (
-    "arch", "belt-landing", "cascade", "coal-transfer", "cradle", "damper-plate", "domino-gate",
-    "dominoes", "drum", "feeder", "flap-gate", "free-fall", "galton", "heap", "hopper",
+    "arch", "belt-landing", "bucket-elevator", "cascade", "coal-transfer", "cradle",
+    "damper-plate", "domino-gate", "dominoes", "drum", "feeder", "flap-gate", "free-fall",
+    "galton", "heap", "hopper",
     "inclined-20", "inclined-40", "inclined-60", "inclined-conveyor", "loop", "low-speed",
     "mixture", "perpendicular", "perpendicular-fast", "rock-box", "see-saw", "silo", "slip",
     "spoon", "stream", "stream-independent", "two-sizes", "vibrating-feeder",

@@ -36,6 +36,7 @@ AUTO = {
     "mixture": "contact",
     "damper-plate": "contact",
     "drum": "contact",
+    "bucket-elevator": "contact",
     "flap-gate": "contact",
     "vibrating-feeder": "contact",
     "see-saw": "contact",

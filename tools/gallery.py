@@ -29,7 +29,9 @@ GROUPS = {
     "Streams": ("stream", "stream-independent", "coal-transfer", "rock-box", "spoon"),
     "Bins, heaps, screens": ("hopper", "feeder", "silo", "heap", "mixture", "galton"),
     "Further machines": ("inclined-conveyor", "cascade", "free-fall"),
-    "What moves": ("damper-plate", "see-saw", "flap-gate", "vibrating-feeder", "drum"),
+    "What moves": (
+        *("damper-plate", "see-saw", "flap-gate", "vibrating-feeder", "drum", "bucket-elevator"),
+    ),
     "Toys": ("dominoes", "domino-gate", "cradle", "arch", "loop"),
 }
 """The scenes by what one comes for."""

@@ -90,7 +90,7 @@ def _head(column: Column, said: Words) -> str:
 
 
 def value_of(recording: Recording, column: Column) -> float:
-    """Return what a column tells of a run; NaN where the machine has none such."""
+    """Return what a column tells of a run; NaN where the machine has no such part."""
     formula = of_quantities(column.value or "nan")
     names = quantities_in(column.value or "nan")
     told = dict.fromkeys(names, nan)

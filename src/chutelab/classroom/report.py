@@ -60,7 +60,7 @@ CHANGED: Final = 0.01
 """Share by which a key is changed, up and down, for its sensitivity; angles by so many radians."""
 
 ROUNDING: Final = 1e-9
-"""Share of a result by which a change of it is none."""
+"""Share of a result; smaller changes of it are told as none."""
 
 TURNED: Final = (
     "incoming.speed", "incoming.pulley_radius", "plate.angle_deg", "plate.restitution",

@@ -306,7 +306,7 @@ class Machine:
 
     @property
     def broad(self) -> Any:
-        """Radius of each particle's circle of the same area, m, (N,): that of a disk is its own."""
+        """Radius of the circle with each particle's area, m, (N,): of a disk its radius."""
         found = np.broadcast_to(np.asarray(self.particle.radius, dtype=float), self.count).copy()
         for kind, corners in enumerate(self.outlines):
             if corners is not None:

@@ -140,6 +140,8 @@ def _hinges(recording: Record, figures: Any) -> list[Broken]:
     step, is judged by ΔE alone, roughly.
     """
     told = list[Broken]()
+    if not recording.machine.movers:
+        return told
 
     def must(law: str, surface: int, amount: float, bound: float, unit: str = "J") -> None:
         if not amount <= bound:
@@ -293,7 +295,7 @@ _ENGINES = ("exact", "contact", "pymunk")
 
 
 def alike(recording: Record) -> bool:
-    """Tell whether all is left to Chipmunk, in steps that are all alike."""
+    """Tell whether Chipmunk finds and solves all contacts, in equal steps."""
     m = recording.machine
     return recording.engine == "pymunk" and (
         m.interact

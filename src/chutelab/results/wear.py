@@ -327,7 +327,7 @@ class _Face:
         omega = knots["omega"][left] + share * (knots["omega"][left + 1] - knots["omega"][left])
         along = np.stack([normal[:, 1], -normal[:, 0]], axis=-1)
         slip = np.abs(((velocity - moved) * along).sum(axis=-1) + radius * omega)
-        # Where it slips alike, or not at all, by time.
+        # Where it slips at one speed, or not at all, by time.
         mean = np.bincount(left, slip / looks, len(knots))[left]
         by_slip = np.divide(slip, mean, out=np.ones_like(slip), where=mean > 0.0)
         begin, end = (

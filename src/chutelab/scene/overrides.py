@@ -237,7 +237,7 @@ def sized(value: Any, path: Sequence[str | int] = ()) -> Any:
 
 
 def value_of(text: str) -> object:
-    """Read a TOML value; what is none stands for itself, as a string.
+    """Read a TOML value; text that is no such value is taken as a string.
 
     >>> value_of("0.5"), value_of("[0, 1]"), value_of("adhesion")
     (0.5, [0, 1], 'adhesion')

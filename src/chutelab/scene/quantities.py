@@ -371,7 +371,7 @@ def every(surfaces: Collection[str], count: int) -> Iterator[Quantity]:
 
 
 def whose(row: Quantity, count: int) -> str:
-    """Say how a name has to tell which of several particles it means; "" if it does.
+    """Say how to name one of several particles; "" if the name does so already.
 
     Examples
     --------

@@ -314,7 +314,7 @@ class SceneTables(Table):
         material, values = self._material(particle), []
         for key in ("restitution", "friction"):
             said = [home for home in homes if key in home.model_fields_set]
-            # Whether the incoming belt grips is its own matter.
+            # A material says nothing about the friction of the incoming belt.
             grips = key == "friction" and isinstance(homes[0], Incoming)
             if material is not None and not said and not grips:
                 values.append(value(material, key + column))

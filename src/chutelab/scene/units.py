@@ -192,7 +192,7 @@ BRIEFEST: Final = 1e-9
 """s; less than a blow between the smallest grains lasts, which has no duration here."""
 
 WEAKEST: Final = 1e-9
-"""m/s²; the pull of a grain of 1 mm on another, about. Weaker gravity is none: write 0."""
+"""m/s²; the pull of a grain of 1 mm on another, about. For weaker gravity write 0."""
 
 SLOWEST: Final = 1e-9
 """m/s; 3 cm in a year, as continents drift. What is slower stands still: write 0."""
@@ -432,7 +432,7 @@ def sphere_mass(density: float, radius: float) -> float:
 
 
 def tonnes_per_hour(text: str) -> float:
-    """Read a rate such as "120 t/h"; NaN if it is none.
+    """Read a rate such as "120 t/h"; NaN of other text.
 
     >>> tonnes_per_hour("120 t/h")
     120.0

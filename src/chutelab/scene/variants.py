@@ -102,9 +102,9 @@ def varied(varies: Varied, kind: type[Vary]) -> list[Vary]:
 
 
 def numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, ...], str]:
-    """Return numbers, with or without unit, in the SI unit, and which that is; "" if none is there.
+    """Return numbers, with or without unit, in the SI unit, and that unit; "" without one.
 
-    Raises an `InputError` if one is none; it says `form`, what is allowed.
+    Raises an `InputError` if one is no number; it says `form`, what is allowed.
     """
     values, units = [], set()
     for part in parts:
@@ -132,7 +132,7 @@ class Quantity:
 
 
 def quantity(scene: Scene, vary: Vary) -> Quantity:
-    """Return what a varied key of a scene is; an `InputError` if none, or one without a number."""
+    """Return what a varied key of a scene is; an `InputError` if it is unknown, or no number."""
     document = plain(to_dict(scene))
     faults, _ = apply(document, [Override(vary.key, plain_number(vary.values[0]))])
     if faults:

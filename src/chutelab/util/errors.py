@@ -206,7 +206,7 @@ def too_old(extra: str | None = None) -> list[str]:
 
 
 def _metadata(package: str) -> str:
-    """Return what is said of a package, "" of none; to read all of it takes five times as long."""
+    """Return the METADATA of a package as text, which is fast; "" if it is not installed."""
     # Here, as the help of a command needs none of it.
     from importlib.metadata import PackageNotFoundError, distribution
 

@@ -58,7 +58,7 @@ class Evidence:
 
     @property
     def alike(self) -> bool:
-        """Whether all is left to Chipmunk, in steps that are all alike."""
+        """Whether Chipmunk finds and solves all contacts, in equal steps."""
         return alike(self.recording)
 
     @cached_property

@@ -152,7 +152,7 @@ FUNCTIONS: Final = ("abs", "acos", "atan2", "cos", "degrees", "hypot", "radians"
 
 
 def quantities_in(formula: str) -> list[str]:
-    """Return the quantities in a column's formula, sorted; a `SyntaxError` if it is none.
+    """Return the quantities in a column's formula, sorted; a `SyntaxError` if it is no formula.
 
     >>> quantities_in("hypot(landing.vx, landing.vy) / 2")
     ['landing.vx', 'landing.vy']

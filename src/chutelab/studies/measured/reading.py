@@ -38,7 +38,7 @@ _EMPTY: Final = ("", "nan", "null", "na", "n/a", "-", "--")
 
 
 def lines_of(path: Path) -> list[str]:
-    """Return the lines of a text file; a `MeasuredError` if it is none."""
+    """Return the lines of a text file; a `MeasuredError` if it is no text file."""
     try:
         data = first_bytes(path, LARGEST_FILE)
     except (OSError, ValueError) as error:

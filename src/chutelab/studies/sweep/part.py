@@ -241,7 +241,7 @@ def _locked(path: Path) -> BinaryIO:
 
 
 def _object(line: bytes) -> dict[str, Any]:
-    """Return the JSON object of a line, an empty one if it is none."""
+    """Return the JSON object of a line, an empty one if it is no JSON object."""
     try:
         found = json.loads(line)
     except (ValueError, RecursionError):

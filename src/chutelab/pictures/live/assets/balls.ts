@@ -6,7 +6,7 @@ import type { Point } from "./scene.ts";
 
 export type Hue = "material" | "kind" | "speed" | "size";
 
-/** Light, middle and dark of a ball, by material; what is of none has that of its stream. */
+/** Light, middle and dark of a ball, by material; without one it has its stream's colour. */
 const SHADES: Record<string, [string, string, string]> = {
   steel: ["#ffffff", "#c3ccd3", "#59656f"],
   rubber: ["#f3a08a", "#c4432a", "#6d1f10"],

@@ -161,13 +161,11 @@ export function* conflictsOf(scene: Scene, given: Given, lab: Lab): Generator<Wr
   yield* contradictions(scene, given, lab);
   yield* pieceConflicts(scene);
   yield* motionConflicts(scene, given);
-  yield* jointConflicts(scene, given);
   yield* corneredConflicts(scene, given);
   for (const n of scene.streams.keys()) yield* streamConflicts(scene, given, n);
-  const counts = scene.streams.map(({ count }) => count);
-  const most = scene.most;
-  if (counts.reduce((sum, count) => sum + count, 0) > most) {
-    const n = counts.indexOf(Math.max(...counts));
+  const { most } = scene;
+  if (scene.count > most) {
+    const counts = scene.streams.map(({ count }) => count), n = counts.indexOf(Math.max(...counts));
     yield [pathOf(given, "stream", n, "count"), counts[n], "too-many", { high: most }];
   }
   const { view } = scene;
@@ -229,52 +227,42 @@ function* pieceConflicts(
   }
 }
 
-/** Yields what cannot hang on a hinge or wait for a touch, and what no engine can run that was
- * asked for. */
+/** Tells whether there are several particles that do not meet. */
+const isApart = ({ count, crowded }: Scene) => count > 1 && !crowded;
+
+/** Yields what cannot hang on hinges or joints or wait for a touch, and what no engine can run that
+ * was asked for. */
 function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
-  const { streams, crowded, run } = scene, movers = moversOf(scene);
-  const count = streams.reduce((sum, stream) => sum + stream.count, 0);
-  const waits = triggersOf(scene).length > 0;
+  const { streams, run } = scene, movers = moversOf(scene), waits = triggersOf(scene).length > 0;
   const clings = scene.pair.findIndex(clinging);
   const isOneSided = scene.surface.some(({ passes }) => passes);
-  if (run.engine === "exact" && (movers.length || crowded || waits || isOneSided)) {
+  if (run.engine === "exact" && (movers.length || scene.crowded || waits || isOneSided
+    || scene.joints.length || scene.particles.some(({ outline }) => outline.length))) {
     yield ["run.engine", run.engine, "not-exact"];
   }
-  if (waits && count > 1 && !crowded) {
+  if ((waits || movers.some(([, { hinge }]) => hinge)) && isApart(scene)) {
     yield [pathOf(given, "stream", 0, "interact"), streams[0].interact, "hinge-meet"];
+  }
+  if (scene.joints.length && isApart(scene)) {
+    yield [pathOf(given, "stream", 0, "interact"), streams[0].interact, "joint-meet"];
   }
   if (clings >= 0 && movers.some(([, { hinge }]) => hinge)) {
     const pair = scene.pair[clings], key = clinging(pair)!;
     yield [`pair[${clings}].${key}`, pair[key], "hinge-clings"];
   }
-  for (const [, { hinge, stops_deg: stops, given: row }] of movers) {
+  for (const [, { stops_deg: stops, given: row }] of movers) {
     const table = scene.surface.some((one) => one.given === row) ? "surface" : "plate";
     const n = listOf(given[table]).indexOf(row);
-    if (hinge && count > 1 && !crowded) {
-      yield [pathOf(given, "stream", 0, "interact"), streams[0].interact, "hinge-meet"];
-    }
     if (stops && !(stops[0] <= 0 && stops[1] >= 0 && stops[0] < stops[1])) {
       yield [pathOf(given, table, n, "stops_deg"), stops, "stops"];
     }
   }
 }
 
-/** Yields what joints cannot hold, or the contact engine cannot run with them. */
-function* jointConflicts(scene: Scene, given: Given): Generator<Wrong> {
-  const { joints, streams, crowded, run } = scene;
-  if (!joints.length) return;
-  const count = streams.reduce((sum, stream) => sum + stream.count, 0);
-  if (run.engine === "exact") yield ["run.engine", run.engine, "not-exact"];
-  if (count > 1 && !crowded) {
-    yield [pathOf(given, "stream", 0, "interact"), streams[0].interact, "joint-meet"];
-  }
-}
-
 /** Yields what the contact engine does not have with boxes and polygons. */
 function* corneredConflicts(scene: Scene, given: Given): Generator<Wrong> {
-  const { particles, run, incoming, pair } = scene, text = "cornered";
+  const { particles, incoming, pair } = scene, text = "cornered";
   if (!particles.some(({ outline }) => outline.length)) return;
-  if (run.engine === "exact") yield ["run.engine", run.engine, "not-exact"];
   for (const [n, { outline, rolling_friction: rolls, points }] of particles.entries()) {
     if (outline.length && rolls) yield [pathOf(given, "particle", n, "rolling_friction"), rolls, text];
     if (points && !isConvex(points)) yield [pathOf(given, "particle", n, "points"), points, "convex"];
@@ -311,7 +299,6 @@ function* kindConflicts(scene: Scene, given: Given): Generator<Wrong> {
 
 /** Yields what the rules that Python has too find within a row of a table. */
 function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<Wrong> {
-  const count = scene.streams.reduce((sum, stream) => sum + stream.count, 0);
   const tables: Record<string, any[]> = {
     run: [scene.run], plate: scene.plates, particle: scene.particles, stream: scene.streams,
     surface: scene.surface, conveyor: scene.conveyor, sensor: scene.sensor, pair: scene.pair,
@@ -325,7 +312,7 @@ function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<
         abs: Math.abs, radians: (angle: number) => angle * RADIANS, near: tooNear, run: scene.run,
         number: Number.isFinite, given: has(row.given), has: has(given), sound: () => true,
         before: (key: string) => rows.slice(0, n).some((one) => has(one.given)(key)),
-        value: (key: string) => row[key], gravity: scene.gravity, count,
+        value: (key: string) => row[key], gravity: scene.gravity, count: scene.count,
         kind: scene.particles[table === "stream" ? scene.kinds[n] : 0],
       };
       for (const [keys, when, text, other] of rules[table] ?? []) {

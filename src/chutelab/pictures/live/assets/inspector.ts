@@ -108,7 +108,7 @@ class Fields {
     return row;
   }
 
-  /** The range of a number, of one that has none up to twice what it is; and a step through it. */
+  /** The range of a number, up to twice its value where the key has no range; and a step. */
   rangeOf({ low, high, value, table, name }: Field) {
     const wide = high - low > NARROW, top = wide ? 2 * (Math.abs(value) || 0.5) : high;
     const ten = 10 ** Math.floor(Math.log10(top)), end = Math.ceil(top / ten) * ten;

@@ -28,7 +28,7 @@ const STATISTICS: Record<string, (sorted: number[]) => number> = {
     (values: number[]) => quantile(values, share / 100)])),
 };
 
-/** What an event tells under the name of a part of it; NaN of none. */
+/** A number of an event by its name in quantities; NaN without an event. */
 function told(event: Event | undefined, part: string): number {
   if (!event) return NaN;
   if (part === "t" || part === "x" || part === "y") return event[part];

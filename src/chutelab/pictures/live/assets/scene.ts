@@ -182,6 +182,7 @@ export interface Scene {
   run: { until: "landed" | "settled" | number, max_time: number, dt: number,
     engine: string, loads?: number };
   kinds: number[]; // which of the particles each stream consists of
+  count: number; // of all particles
   crowded: boolean; // whether particles meet
   most: number; // how many particles a page has room for
   sensor: { name: string, from: Point, to: Point }[]; // lines that count what passes
@@ -267,7 +268,7 @@ export function resolve(given: Given, lab: Lab): Scene {
     conveyor: rows("conveyor"), surface,
     joints: JOINTS.flatMap((kind) => rows(kind).map((row) => ({ ...row, kind }))),
     streams, run, kinds, sensor: rows("sensor"), view: given.view ?? null,
-    crowded: count > 1 && streams.some((stream) => stream.interact),
+    count, crowded: count > 1 && streams.some((stream) => stream.interact),
     most: lab.tables.stream.count.high ?? Infinity,
   };
   for (const wrong of conflictsOf(scene, given, lab)) throw new Fault(...wrong);

@@ -26,7 +26,7 @@ export function atan2(y: number, x: number) {
   return functions.angle_of(y, x);
 }
 
-/** Returns the angle from 0 to π (rad) of a cosine; NaN of what is none. */
+/** Returns the angle from 0 to π (rad) of a cosine; NaN of other numbers. */
 export function arcCos(cosine: number) {
   return functions.angle_of_cosine(cosine);
 }

@@ -136,7 +136,7 @@ class Words {
     }).join(bare ? ", " : "\n");
   }
 
-  /** A number that was typed, with point or comma; NaN if it is none. */
+  /** A number that was typed, with point or comma; NaN of other text. */
   parse(text: string) {
     const plain = text.trim().replace("−", "-").replace(",", ".");
     return /^[-+.\de]+$/i.test(plain) ? Number(plain) : NaN;

@@ -461,7 +461,7 @@ def test_what_cannot_be_written_to_is_refused_before_the_work(arguments, monkeyp
     assert re.fullmatch(rf"Error: .*{name}\S*: cannot be written.*: No such file .*\n", said)
 
 
-def test_a_pipe_that_nobody_writes_to_is_not_waited_for():
+def test_a_pipe_without_a_writer_is_not_waited_for():
     os.mkfifo("pipe")
     assert "pipe: cannot be read: it is a pipe, not a file" in refused("run", "pipe")
     assert "it is a pipe, not a file" in refused("compare", "slip", "--data", "pipe")

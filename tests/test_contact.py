@@ -234,7 +234,7 @@ def feeder(count=60):
 
 
 @pytest.mark.slow
-def test_whose_place_is_taken_waits_for_it():
+def test_what_has_its_place_taken_waits_for_it():
     # One leaves the place free for the next when it is 2 r away: |v t + g t²/2| = 2 r.
     machine = feeder()
     recording = run(machine)
@@ -250,7 +250,7 @@ def test_whose_place_is_taken_waits_for_it():
     assert np.median(gaps) <= clear + 1.01 * hop_step(machine, machine.dt)
 
 
-def test_who_finds_no_place_to_the_end_is_never_released():
+def test_what_finds_no_place_to_the_end_is_never_released():
     machine = scene_of(
         surface=[{"name": "cup", "points": [[-0.03, 0.08], [-0.03, 0.0], [0.03, 0.0],
                                             [0.03, 0.08]], "restitution": 0.0}],
@@ -325,7 +325,7 @@ def test_boxes_are_asleep_within_four_seconds(width):
 
 
 @pytest.mark.parametrize("friction", [0.2, 0.5])
-def test_nobody_settles_on_the_belt_that_throws(friction):
+def test_none_settles_on_the_belt_that_throws(friction):
     # At the belt's speed on the incoming belt it has no slip, and will still be thrown off.
     machine = build(scene.load("stream", [f"incoming.friction={friction}", "stream.count=50"]))
     recording = run(machine)
@@ -338,7 +338,7 @@ def test_nobody_settles_on_the_belt_that_throws(friction):
 
 
 @pytest.mark.parametrize("name", ["galton", "rock-box"])
-def test_in_a_crowd_who_parts_from_a_surface_does_so_on_its_track(name):
+def test_in_a_crowd_what_parts_from_a_surface_does_so_on_its_track(name):
     recording = run(build(scene.load(name, ["stream.count=40"])))
     events = recording.events[recording.events["kind"] == Kind.SEPARATION]
     assert len(events) > 40

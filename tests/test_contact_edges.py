@@ -141,7 +141,7 @@ def test_what_a_nip_costs_is_the_same_at_a_finer_step(angle, friction, wall):
 
 
 @pytest.mark.parametrize("crowded", [False, True])
-def test_who_is_struck_off_a_ramp_has_left_the_ramp(crowded):
+def test_what_is_struck_off_a_ramp_has_left_the_ramp(crowded):
     """It slides down at 45 degrees onto the ground, without friction, and is thrown off both.
 
     v^2 = 2 g s sin 45 along the ramp; half of v sin 45 comes back, off the ramp.

@@ -364,7 +364,7 @@ def test_the_end_of_an_arc_is_struck_by_what_comes_in_at_the_opening(aside, crow
     np.testing.assert_allclose(hit["velocity_after"], v - 1.5 * (v @ normal) * normal, atol=1e-9)
 
 
-def test_who_flies_away_over_an_arc_is_not_struck_by_its_inside():
+def test_what_flies_away_over_an_arc_is_not_struck_by_its_inside():
     # Beside a bowl, below its rim, it falls on the ground: one blow.
     bowl = {"center": (0.0, 1.0), "radius": 0.4, "begin": -pi, "extent": pi}
     ground = face("ground", (-1.0, 0.61), (-0.28, 0.61), restitution=0.8, friction=0.0)
@@ -414,7 +414,7 @@ def test_the_end_of_a_moving_arc_runs_as_its_nearer_face(outside):
 
 @pytest.mark.parametrize(("engine", "crowded"), [(contact, False), (contact, True), (exact, False)])
 @pytest.mark.parametrize("arc", [False, True])
-def test_a_gate_shuts_on_nobody_and_holds_who_comes_later(arc, engine, crowded):
+def test_a_gate_that_shuts_ignores_what_it_overlaps_and_holds_what_comes(arc, engine, crowded):
     # Three fall past y = 0: one in it when it shuts falls on freely, as does one just beyond it;
     # the third meets it as the parabola does.
     shut = 0.2001

@@ -397,7 +397,7 @@ def test_independent_particles_pass_through_each_other(engine):
     assert together.track(0).tobytes() == alone.track(0).tobytes()
 
 
-def test_who_stalls_is_named_and_what_was_recorded_is_kept(monkeypatch):
+def test_what_stalls_is_named_and_what_was_recorded_is_kept(monkeypatch):
     # The core's word for it, when it comes back for the third time.
     statuses = iter([None, None, host.Status.STALLED])
     really = host.Module.run

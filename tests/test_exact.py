@@ -336,7 +336,7 @@ def test_a_run_that_is_looked_at_after_each_event_is_the_same(monkeypatch):
 @pytest.mark.parametrize(
     ("at", "depth"), [([0.0, 0.009], 0.001), ([0.0, -0.004], 0.006), ([50.003, 0.004], 0.005)]
 )
-def test_nobody_starts_inside_a_surface(at, depth):
+def test_nothing_starts_inside_a_surface(at, depth):
     with pytest.raises(scene.SceneError, match=r"stream\.at") as refused:
         thrown(at, [0.0, 0.0], FLOOR, radius=0.01)
     assert f"would start {0.01 - depth:.6g} m from it" in str(refused.value)

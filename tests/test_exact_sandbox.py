@@ -95,7 +95,7 @@ def test_a_sphere_rolls_down_with_five_sevenths_and_a_disk_with_two_thirds():
 # Gates
 
 
-def test_who_lies_or_slides_on_a_gate_flies_when_it_opens():
+def test_what_lies_or_slides_on_a_gate_flies_when_it_opens():
     """With `settled` too: at rest until then, however long, and beside those on firm ground."""
     floor, firm = (
         face(name, [x, 0.0], [x + 6.0, 0.0], friction=0.3, restitution=0.0)

@@ -280,7 +280,7 @@ def test_engines_that_are_not_for_a_scene_are_left_out(more, engines, skipped):
 
 
 @pytest.mark.parametrize("name", sc.shipped())
-def test_each_shipped_scene_says_what_it_shows_and_who_says_so(name):
+def test_each_shipped_scene_says_what_it_shows_and_by_what_source(name):
     scene = sc.load(name)
     assert len(scene.expect) >= 3
     assert all(len(expect.source) > 5 for expect in scene.expect)

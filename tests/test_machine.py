@@ -412,7 +412,7 @@ def test_particles_of_several_kinds_are_arrays():
     assert not found.releases.t.any()
 
 
-def test_a_packed_box_holds_everybody_and_nobody_is_in_another_or_in_a_surface():
+def test_a_packed_box_holds_all_and_none_is_in_another_or_in_a_surface():
     wall = {"name": "wall", "from": [0.1, 0.0], "to": [0.2, 0.5]}
     peg = {"name": "peg", "center": [0.25, 0.1], "radius": 0.03}
     found = machine.build(scene.from_dict({**MIXTURE, "surface": [wall, peg]}))

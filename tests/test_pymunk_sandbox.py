@@ -158,7 +158,7 @@ def test_a_drum_drives_a_ball_inside_it(extent):
 
 
 @pytest.mark.parametrize(("run_table", "off"), [({}, 1e-12), (STEPPED, 3e-3)])
-def test_gates_open_and_shut_on_nobody(run_table, off):
+def test_gates_open_and_shut_without_a_push(run_table, off):
     gate = face("gate", (-1.0, 0.0), (1.0, 0.0), restitution=0.0)
     m = lone((0.0, 0.01), until=0.5, dt=1e-3, surface=[gate], run=run_table)
     end = run(gated(m, 0, vanishes=0.25)).track(0)[-1]

@@ -102,7 +102,7 @@ NONSENSE = [
 ]
 
 
-def test_nonsense_has_its_reason_as_its_row_and_stops_nobody(returned, tmp_path):
+def test_nonsense_has_its_reason_as_its_row_and_stops_no_other(returned, tmp_path):
     paths = [returned("first.json", result())]
     for i, (_, content) in enumerate(NONSENSE):
         paths.append(returned(f"{i}.json", content if not isinstance(content, bytes) else ""))

@@ -106,7 +106,7 @@ def written(folder, commands, environment):
         pytest.param([*QUICK, *ALGEBRA], {}, marks=pytest.mark.slow, id="algebra"),
     ],
 )
-def test_files_are_the_same_bits_whoever_writes_them(tmp_path, commands, kernels):
+def test_files_are_the_same_bits_from_any_process(tmp_path, commands, kernels):
     one = written(tmp_path / "one", commands, ONE)
     other = written(tmp_path / "another folder" / "other", commands, {**OTHER, **kernels})
     assert list(one) == list(other)

@@ -44,7 +44,7 @@ def test_the_bins_of_the_galton_board_are_binomial(count):
     ],
 )
 @pytest.mark.slow
-def test_who_falls_through_the_screen_is_smaller_than_its_gap(bar, small, large, share):
+def test_what_falls_through_the_screen_is_smaller_than_its_gap(bar, small, large, share):
     changes = {"surface.bars.radius": bar, "stream.fines.count": 100, "stream.lumps.count": 20}
     changes |= {"particle.small.radius": small, "particle.large.radius": large, "expect": None}
     recording = simulate(sc.load("mixture").with_values(changes))

@@ -336,7 +336,7 @@ def test_a_name_that_meant_two_things_says_what_it_is_called(command, words):
     assert words in call(*command.split(), code=2)
 
 
-def test_what_is_expected_of_a_crowd_says_whose_it_is():
+def test_what_is_expected_of_a_crowd_says_which_it_is_of():
     text = {"value": 1.0, "tolerance": 0.5, "source": "me"}
     scene = load("stream")
     with pytest.raises(SceneError, match=r"particles\[0\]\.landing\.x, or landing\.x\.mean"):

@@ -143,7 +143,7 @@ def run_stuck(monkeypatch, tmp_path, *arguments, code=1):
     return outcome.stderr
 
 
-def test_a_stuck_run_says_who_and_where_and_writes_nothing(monkeypatch, tmp_path):
+def test_a_stuck_run_says_which_particle_and_where_and_writes_nothing(monkeypatch, tmp_path):
     said = run_stuck(monkeypatch, tmp_path, "--out", "out")
     assert "particle 0 is stuck at t = 0.75 s, x = 0.25 m, y = 0.004 m: it rattles" in said
     assert "--partial" in said
@@ -268,7 +268,7 @@ def test_a_signal_that_other_code_has_swallowed_ends_the_next_run():
     chutelab.simulate("perpendicular")
 
 
-def test_what_is_ignored_or_somebody_elses_is_left_alone():
+def test_what_is_ignored_or_of_another_program_is_left_alone():
     mine = signal.signal(signal.SIGTERM, lambda *_: None)
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:

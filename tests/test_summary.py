@@ -169,7 +169,7 @@ FEED = ("stream.count=12", "stream.rate=1000", "stream.bed_height=0", "run.until
 
 
 @pytest.mark.parametrize("engine", ["contact", "pymunk"])
-def test_it_says_who_waited_for_a_place_and_how_long(engine):
+def test_it_says_how_many_waited_for_a_place_and_how_long(engine):
     # In one layer on a belt of 2 m/s the place is free again after 2 r / v = 6.3 ms: particle i is
     # due at i ms and comes at 6.3 i ms, 5.3 i ms late. Engines look once a step of 1 ms.
     recording = run("stream", *FEED, f"run.engine={engine}")
@@ -184,7 +184,7 @@ def test_it_says_who_waited_for_a_place_and_how_long(engine):
 
 
 @pytest.mark.parametrize("engine", ["contact", "pymunk"])
-def test_nobody_waits_where_there_is_room(engine):
+def test_none_waits_where_there_is_room(engine):
     # 1/150 s at 2 m/s is 13.3 mm; the pymunk engine releases at its steps, which is no waiting.
     changed = ("stream.rate=150", "incoming.friction=0.5", f"run.engine={engine}")
     assert printed(run("stream", *FEED, *changed))["waited"] is None
@@ -221,7 +221,7 @@ def test_what_trembles_on_a_floor_is_stuck_and_what_slides_is_not():
     assert plugged(run) == Plug(1, 1)
 
 
-def test_who_never_finds_a_place_is_counted_and_who_is_not_due_is_not():
+def test_what_never_finds_a_place_is_counted_and_what_is_not_due_is_not():
     # One lies in the place for good; until 0.045 s particles 1 to 4 are due.
     lying = {
         "surface": [{"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0]}],

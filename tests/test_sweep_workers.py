@@ -117,7 +117,7 @@ def served(stack, answer):
 
 
 @pytest.mark.parametrize("answer", [None, b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\xff" * 4096])
-def test_somebody_else_at_the_port_is_no_scheduler(monkeypatch, capfd, answer):
+def test_another_program_at_the_port_is_no_scheduler(monkeypatch, capfd, answer):
     pytest.importorskip("distributed")
     monkeypatch.setattr("chutelab.studies.sweep.PATIENCE", 1.0)
     with ExitStack() as stack:

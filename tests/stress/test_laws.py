@@ -183,7 +183,7 @@ def test_two_in_one_place_overlap():
     assert not bad.holds
 
 
-def test_nobody_stays_in_another_for_longer_than_a_step():
+def test_no_disk_stays_in_another_for_longer_than_a_step():
     """Two disks of 2 cm, 4 mm deep in each other from the middle on: 0.2 r, and more than 5 %."""
 
     def still(knots):

@@ -108,7 +108,7 @@ def test_a_gate_is_there_only_while_it_is_closed(keys, through):
 
 
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
-def test_a_gate_shuts_on_nobody(engine):
+def test_a_gate_that_shuts_ignores_what_it_overlaps(engine):
     """Closed at 0.495 s, when the centre is 5 mm before it: the disk flies on."""
     e = evidence(gated(closes_at=0.495), engine, None if engine == "exact" else 1e-3)
     assert e.recording.knots["position"][-1, 0] == pytest.approx(1.0, rel=1e-9)

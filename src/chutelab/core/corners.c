@@ -18,9 +18,12 @@
 #define QUICK 20
 /* Cosine of an angle between edge and surface from which on a corner near its end counts as on it. */
 #define FLAT 0.9
-/* Sweeps of a blow at several places, and of its size, at which they end. */
-#define SWEEPS 10000
+/* Sweeps of a blow at several places, and of its size, at which they end; those after which it is first solved at once. */
+#define SWEEPS 2000
 #define ENDS 1e-15
+#define DIRECT 4
+/* Of what an impulse changes at its own place: less is left by rounding where two of them do the same. */
+#define SAME 1e-6
 /* Of the velocity that an impulse would change if there were no joints: what is less, they hold. */
 #define HELD 1e-13
 /* Share of it that a blow may give by rounding. */
@@ -294,23 +297,28 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
 
 double inner_of(int i, int j) { return j < 0 ? W.disks[i].inner : MIN(W.disks[i].inner, W.disks[j].inner); }
 
-/* List the places at which particle i, which has corners, is nearer than `within` to j at t, and what their gaps are
-   at `later`; up to MOST_TOUCHES. */
+/* List the places at which a polygon is nearer than `within` to something else, up to MOST_TOUCHES. */
+static int list_between(const Shape *a, const Shape *b, double near, double within, Touch *list) {
+    int count = 0;
+    if (are_apart(a, b, within + near)) return 0;
+    for (int c = 0; c < a->count + b->count && count < MOST_TOUCHES; c++) {
+        Touch *now = list + count;
+        now->which = c;
+        if (!find_place(a, b, near, now) || now->gap > within) continue;
+        int known = 0;
+        for (int n = 0; n < count && c >= a->count; n++)
+            known |= length_of(list[n].x - now->x, list[n].y - now->y) <= near
+                && (c - a->count != b->round || list[n].nx * now->nx + list[n].ny * now->ny > FLAT);
+        count += !known;
+    }
+    return count;
+}
+
+/* The same of particle i, which has corners, and j at t; and what the gaps of the places are at `later`. */
 RARELY int list_touches(int i, int j, double t, double within, double later, Touch *list) {
     double near = TOUCH * inner_of(i, j);
     Shape a = shape_of(i, t), b = shape_of(j, t);
-    int count = 0;
-    if (are_apart(&a, &b, within + near)) return 0;
-    for (int c = 0; c < a.count + b.count && count < MOST_TOUCHES; c++) {
-        Touch *now = list + count;
-        now->which = c;
-        if (!find_place(&a, &b, near, now) || now->gap > within) continue;
-        int known = 0;
-        for (int n = 0; n < count && c >= a.count; n++)
-            known |= length_of(list[n].x - now->x, list[n].y - now->y) <= near
-                && (c - a.count != b.round || list[n].nx * now->nx + list[n].ny * now->ny > FLAT);
-        count += !known;
-    }
+    int count = list_between(&a, &b, near, within, list);
     if (!(later > t) || !count) return count;
     a = shape_of(i, later);
     b = shape_of(j, later);
@@ -463,13 +471,12 @@ static double root_of(int i, int j, Touch *at, double low, double high, double a
     return high;
 }
 
-/* Whether a place at which two touch at t closes faster than `soft`. */
-static int closes_faster(int i, int j, double t, double within, double soft) {
+/* Whether a place at which two touch at t, when they are as that, closes faster than `soft`. */
+static int closes_faster(int i, int j, const Shape *a, const Shape *b, double t, double within, double soft) {
     Touch places[MOST_TOUCHES];
-    int count = list_touches(i, j, t, within, t, places);
-    Shape a = shape_of(i, t), b = shape_of(j, t);
+    int count = list_between(a, b, TOUCH * inner_of(i, j), within, places);
     for (int n = 0; n < count; n++)
-        if (closes_at(i, j, &a, &b, t, places + n) > soft) return 1;
+        if (closes_at(i, j, a, b, t, places + n) > soft) return 1;
     return 0;
 }
 
@@ -490,7 +497,7 @@ double meet_corners(int i, int j, double from, double until, double soft) {
         closed |= gap[c] <= 0;
         if (gap[c] <= most * span) in_reach[many++] = c;
     }
-    if (closed && closes_faster(i, j, from, 0, soft)) return from;
+    if (closed && closes_faster(i, j, &a, &b, from, 0, soft)) return from;
     while (h < span && first == INFINITY && many) {
         double least = INFINITY, last = from + h;
         for (int n = 0; n < many; n++)
@@ -508,7 +515,9 @@ double meet_corners(int i, int j, double from, double until, double soft) {
             gap[c] = gap_at(&a2, &b2, near, &now);
             if (!(before > 0 && gap[c] <= 0)) continue;
             double then = root_of(i, j, &now, last, t, before, gap[c]);
-            if (then < first && closes_faster(i, j, then, TOUCHING * small, soft)) first = then;
+            if (then >= first) continue;
+            Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
+            if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
         }
     }
     return first;
@@ -756,6 +765,55 @@ static void feel(Contact *list, int count, double size) {
     if (answers) forget_answers();
 }
 
+/* What an impulse along a place, or its moment, may be for one of its normal impulse. */
+static double bound_of(const Contact *c, int n, double share) {
+    if (n == 1) return share * MIN(c->friction, share < 1 ? ROUGH : INFINITY);
+    return answers ? 0 : share * c->arm;
+}
+
+/* Find all impulses at once, if those stay free that sweeps have left so, and the others at their bounds: sweeps that
+   follow tell whether they do. What joints answer is known too roughly for it. */
+static void solve_blow(Contact *list, int count, const double *back, double share, double *v) {
+    double rows[3 * MOST_TOUCHES][3 * MOST_TOUCHES + 1], bound[3 * MOST_TOUCHES];
+    int free[3 * MOST_TOUCHES], many = 0;
+    for (int m = 0; m < 3 * count; m++) {
+        const double *J = list[m / 3].impulse;
+        double most = m % 3 ? bound_of(list + m / 3, m % 3, share) : 0;
+        bound[m] = J[m % 3] > 0 ? most : -most;
+        if (m % 3 ? fabs(J[m % 3]) < most * J[0] : J[0] > 0) {
+            free[many++] = m;
+            bound[m] = 0;
+        }
+    }
+    for (int n = 0; n < many; n++) {
+        int m = free[n];
+        rows[n][many] = (m % 3 ? 0 : back[m / 3]) - v[m];
+        for (int k = 0; k < many; k++) {
+            int o = free[k];
+            rows[n][k] = feels[m][o];
+            for (int with = o + 1; o % 3 == 0 && with < o + 3; with++)
+                if (bound[with] != 0) rows[n][k] += feels[m][with] * bound[with];
+        }
+    }
+    for (int n = 0; n < many; n++)
+        for (int k = 0; k < many; k++) {
+            if (k == n || !(fabs(rows[n][n]) > SAME * feels[free[n]][free[n]])) continue;
+            double by = rows[k][n] / rows[n][n];
+            for (int o = n; o <= many && by != 0; o++) rows[k][o] -= by * rows[n][o];
+        }
+    for (int n = 0; n < many; n++) {
+        int m = free[n];
+        double *J = list[m / 3].impulse;
+        if (!(fabs(rows[n][n]) > SAME * feels[m][m])) continue;
+        double more = rows[n][many] / rows[n][n];
+        for (int o = m; o < (m % 3 ? m + 1 : m + 3); o++) {
+            double change = o == m ? more : bound[o] * more;
+            J[o % 3] += change;
+            for (int k = 0; k < 3 * count && change != 0; k++) v[k] += feels[k][o] * change;
+        }
+    }
+}
+
 /* Impulses at all places such that gaps do not close, or open as fast as they are to, and that friction, a share of
    it, stops slip as far as it may, and a disk's rolling friction its rolling, unless there are joints. */
 static void share_blow(Contact *list, int count, const double *back, double share) {
@@ -764,20 +822,25 @@ static void share_blow(Contact *list, int count, const double *back, double shar
         size = MAX(size, back[n]);
         relative(list + n, 0, v + 3 * n);
     }
-    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+    for (int sweep = 0, direct = DIRECT; sweep < SWEEPS; sweep++) {
         double worst = 0;
+        if (sweep == direct && !answers) {
+            solve_blow(list, count, back, share, v);
+            direct *= DIRECT;
+        }
         for (int m = 0; m < 3 * count; m++) {
             const Contact *c = list + m / 3;
             if (m % 3 == 2 && c->arm == 0) continue;
             double *J = list[m / 3].impulse, gives = feels[m][m], most = INFINITY, least = 0;
             if (m % 3) {
-                most = (m % 3 == 1 ? share * MIN(c->friction, share < 1 ? ROUGH : INFINITY) : answers ? 0 : share * c->arm) * J[0];
+                most = bound_of(c, m % 3, share) * J[0];
                 least = -most;
             } else size = MAX(size, fabs(v[m]) + fabs(v[m + 1]));
             double wanted = J[m % 3] + (gives > 0 ? ((m % 3 ? 0 : back[m / 3]) - v[m]) / gives : 0);
             double change = MIN(MAX(wanted, least), most) - J[m % 3];
             if (change == 0) continue;
             J[m % 3] += change;
+            if (m % 3 < 2) size = MAX(size, fabs(J[m % 3]) * gives);
             for (int k = 0; k < 3 * count; k++) v[k] += feels[k][m] * change;
             worst = MAX(worst, fabs(change) * gives * (m % 3 < 2 ? 1 : W.disks[MAX(c->j, 0)].radius));
         }

@@ -639,6 +639,8 @@ static int struck_too(const Contact *c, double t, int *j) {
         if (c->j >= 0) {
             advance(b, t);
             soft = MAX(soft, left_over(b, b->impacts, -1, inner_of(c->i, c->j), 0));
+            double x = a->vx - b->vx, y = a->vy - b->vy, turns = fabs(a->spin) * a->radius + fabs(b->spin) * b->radius;
+            if (turns < soft && x * x + y * y <= square(soft - turns)) return 0;
         }
         for (int n = list_struck(c->i, c->j, t, list) - 1; n >= 0; n--) {
             relative(list + n, 0, u);
@@ -686,10 +688,13 @@ void shock(int i, int j, double t) {
         head = (head + 1) % (W.disk_count + 1);
         W.disks[m].queued = 0;
         if (W.disks[m].landed && W.until == UNTIL_LANDED) continue;
+        const Contact *last = 0;
         for (int link = W.disks[m].links; link >= 0; link = W.links[link]) {
             const Contact *c = W.contacts + link / 2;
-            int partner;
-            if (budget <= 0 || !struck_too(c, t, &partner)) continue;
+            int partner, again = c->cornered && last && last->i == c->i && last->j == c->j;
+            last = c;
+            /* All places of two are struck together. */
+            if (budget <= 0 || again || !struck_too(c, t, &partner)) continue;
             budget--;
             strike(c->i, partner, t);
             queue_up(c->i, &tail);

@@ -28,7 +28,7 @@
 /* m/s on Earth; changes at which sweeps over a few contacts of what has corners or joints end. */
 #define FINE_FEW 1e-11
 /* ... and over many, of those of disks: a pile of boxes hangs together by more, and else does not come to rest. */
-#define CROWD_CORNERS 0.03
+#define CROWD_CORNERS 0.3
 /* Share of its bound up to which friction is not all used: it holds. */
 #define HOLDS 0.999
 

@@ -315,7 +315,7 @@ class Bodies(Dice):
 
     def __init__(self, rng, *, few):
         super().__init__(rng)
-        self.few, self.hangs, self.rows, self.shift = few, self.chance(0.6), [], 0.0
+        self.few, self.hangs, self.rows = few, self.chance(0.6), []
         self.tables = {"run": {"until": 0.35 if few else self.number(0.6, 1.0)}}
         if self.chance(0.2):
             self.tables |= self.one_of(
@@ -358,7 +358,7 @@ class Bodies(Dice):
         self.rows.append({"name": "walls", "points": way, **self.values()})
         for n in range(self.whole(1, 2 if self.few else 4)):
             x = self.number(-0.15, 0.15) if self.few else 0.45 * (n - 1.5) + self.number(-0.1, 0.1)
-            y = -0.6 + 0.25 * self.whole(0, 2)
+            y = -0.15 * n if self.few else -0.6 + 0.25 * self.whole(0, 2)
             self._thing(f"thing-{n}", x, y)
         shut = [row for row in self.rows if "turn" in row or "shake" in row or "travel" in row]
         for row in shut:
@@ -371,6 +371,9 @@ class Bodies(Dice):
         )
         start, end = [x - half[0], y - half[1]], [x + half[0], y + half[1]]
         course = self.one_of("line", "line", "line", "bowl", "peg", "bow", "vee", "shape")
+        if self.few and course in ("bowl", "bow"):
+            # Pymunk's arcs are thousands of segments.
+            course = "vee"
         row, radius = {"name": name, **self.values()}, self.number(0.06, 0.25)
         if course == "line":
             row |= {"from": start, "to": end}
@@ -442,11 +445,12 @@ class Bodies(Dice):
         count, most = (self.whole(1, 2), 1) if self.few else (self.whole(1, 5), self.whole(1, 6))
         x, step = (-0.75, 1.6 / count) if self.hangs else (-0.3, 0.15)
         if self.few:
-            x, step = 0.0, 0.05
+            x, step = -0.05, 0.1
         many = self.whole(0, count - 1)
         for n in range(count):
             kind = self.whole(0, len(kinds) - 1)
-            row = {"particle": kinds[kind], "at": [x + n * step, self.number(0.1, 0.4)],
+            y = self.number(0.12, 0.22 if self.few else 0.4)
+            row = {"particle": kinds[kind], "at": [x + n * step, y],
                    "velocity": self.near(0.0, 0.0, 1.0), "interact": True,
                    **self.values()}  # fmt: skip
             row |= {"omega": self.number(-20.0, 20.0)} if self.chance(0.4) else {}

@@ -356,11 +356,18 @@ static void set_step(double h) {
     W.skip = SKIP / h;
 }
 
-/* Longest step in which what touches the insides of arcs in a crowd does not hop too far, s. */
-static double in_hollows(void) {
-    double most = INFINITY;
-    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++)
-        if (c->turns > 0) most = MIN(most, hop_time(W.disks + c->i, W.g + c->turns));
+/* Longest step in which what touches the insides of arcs in a crowd does not hop too far, and a corner, whose gap is
+   bent by what turns, in this step of a length h, no faster than weight makes it, s. */
+static double bent_step(double h) {
+    double most = INFINITY, press = W.g + W.haste, u[3];
+    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
+        const Disk *d = W.disks + c->i;
+        if (c->turns > 0) most = MIN(most, hop_time(d, W.g + c->turns));
+        if (!c->cornered || press == 0) continue;
+        relative(c, 1, u);
+        double bends = 2 * (c->gap + u[0] * h - c->free_gap) / (h * h);
+        most = MIN(most, MAX(hop_time(d, press) * press / MAX(bends, press), SHORTEST * W.usual));
+    }
     return most;
 }
 
@@ -406,10 +413,8 @@ static int begin_step(void) {
     h = MIN(h, hop_time(W.disks + W.smallest, W.g + W.haste));
     for (int i = W.low; i < W.high && W.outline_count; i++) {
         const Disk *d = W.disks + i;
-        double press = W.g + W.haste, whirl = has_corners(d) && d->mode == FREE ? whirl_of(d) : 0;
-        h = MIN(h, hop_time(d, press + whirl));
-        /* What touches is to hop no faster than weight makes it. */
-        if (press > 0 && (d->supports || d->since == W.t)) h = MIN(h, hop_time(d, press) * press / (press + whirl));
+        double press = W.g + W.haste + (has_corners(d) && d->mode == FREE ? whirl_of(d) : 0);
+        h = MIN(h, hop_time(d, press));
     }
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     if (W.hinges) h = hinge_step(h);
@@ -467,7 +472,7 @@ static int begin_step(void) {
             h = W.step_end - W.t;
             woke = 1;
         }
-        double most = in_hollows();
+        double most = bent_step(h);
         if (h > (1 + 1e-9) * most) {
             set_step(most);
             W.step_end = W.t + most;

@@ -14,8 +14,6 @@
 #define DEEP 0.03
 #define MOST_PARTED 1e-2
 #define GIVES 3e-3
-/* Of gravity: a corner that turns by more acceleration than that flies off what has not pressed it. */
-#define TURNS 10
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
 
@@ -98,8 +96,10 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     double u[3], later, haste = 0;
     if (j < 0 && !place && face_at(surface_at(-1 - j, d->t), d->x, d->y) != W.surfaces + (-1 - j)) return 1;
     if (j < 0) haste = 2 * h * hastes(W.surfaces + (-1 - j), d);
-    if (place) describe_touch(c, i, j, place);
-    else describe(c, i, j);
+    if (place) {
+        describe_touch(c, i, j, place);
+        haste += 2 * h * (whirl_of(d) + (j < 0 ? 0 : whirl_of(W.disks + j)));
+    } else describe(c, i, j);
     /* The next face or pulley that a disk by itself slides on to may be further off. */
     int far = c->gap > TOUCH * least;
     if (far && (W.interact || j >= 0 || !d->supports)) return 1;
@@ -113,12 +113,6 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
        on it in each step. */
     double cohesion = cohesion_of(i, j);
     const Contact *last = place ? place_before(c) : 0;
-    /* What was pressed hops as fast as turning makes it. What opens by itself does not, beyond what weight would do: an
-       impulse would give energy. */
-    double whirl = place ? whirl_of(d) + (j < 0 ? 0 : whirl_of(W.disks + j)) : 0;
-    if (whirl < TURNS * W.g || (last && last->impulse[0] > 0)) haste += 2 * h * whirl;
-    for (int k = place ? -1 : d->before; k >= 0; k = W.earlier[k].next)
-        if (goes_on(W.earlier[k].j, j)) last = W.earlier + k;
     /* N s; what cohesion has held since the step before: of a new contact, what it would have held since the
        latest blow or release. */
     double parts = MAX(W.soft + haste, soft_approach(d, least)), since = d->since;

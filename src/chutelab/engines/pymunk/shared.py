@@ -214,6 +214,9 @@ class Shared:
                 self.calm[i] = -inf if ride.speed else inf
             else:
                 self._free(i, t, x, v, omega)
+            if self.corners:
+                # Chipmunk looks for it where it was as it was added, up to the next step.
+                self.world.space.reindex_shapes_for_body(body)
 
     def _taken(self, i: int, x: Vec2d, v: Vec2d, late: float) -> bool:
         """Tell whether the place where a particle starts is taken, now or when it was due."""

@@ -293,9 +293,8 @@ def test_a_trial_that_is_stuck_is_a_warning_not_a_crash(monkeypatch):
 # What the closed form covers.
 
 
-@pytest.mark.slow
 def test_layers_that_ride_into_each_other_on_a_slow_pulley_are_noticed(brief):
-    overrides = ["incoming.speed=0.7"]
+    overrides = ["incoming.speed=0.7", "stream.count=30"]
     (advice,) = [a for a in look("stream", *overrides).advice if "ride into others" in a.warning]
     # The highest is drawn: 0.7² / (9.81 (0.1063 + h)), 0 <= h <= 0.05 m, is 0.320 to 0.470.
     grip = float(re.search(r"v²/\(g rho\) = ([\d.]+)", advice.warning)[1])

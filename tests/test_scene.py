@@ -207,6 +207,17 @@ SHIPPED = (
 )  # fmt: skip
 
 
+def test_a_text_is_validated_once_and_a_file_that_has_changed_anew(tmp_path):
+    path, text = tmp_path / "own.toml", sc.shipped()["perpendicular"].read_text(encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
+    first = sc.load(path)
+    assert sc.load(path) is first
+    assert sc.load(path, "incoming.speed=3").incoming.speed == 3.0
+    assert sc.load(path).incoming.speed == first.incoming.speed != 3.0
+    path.write_text(text.replace("speed = 2.0", "speed = 2.5", 1), encoding="utf-8")
+    assert sc.load(path).incoming.speed == 2.5
+
+
 def test_exactly_the_promised_scenes_are_shipped():
     assert tuple(sc.shipped()) == SHIPPED, "in alphabetical order"
 

@@ -1,6 +1,6 @@
 """Small things that know nothing of scenes and machines.
 
-- `arrays`: types of arrays; sine, cosine and arc tangent, the same bits everywhere.
+- `arrays`: types of arrays; sine, cosine and arc tangent, the same bits everywhere; bisection.
 - `errors`: invalid input: the one error, its faults, what was meant; missing libraries.
 - `files`: files that are written whole or not at all, CSV and TSV in them.
 - `signals`: Ctrl-C, TERM and HUP, all raised as a KeyboardInterrupt.

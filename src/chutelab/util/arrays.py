@@ -1,4 +1,4 @@
-"""Types of arrays and of callbacks, each named once; sine, cosine and their inverses, of arrays.
+"""Types of arrays and of callbacks, each named once; sine, cosine and their inverses; bisection.
 
 Those of libraries differ in the last bit from one to another. These are of + - * / and square roots
 alone: the same bits everywhere, and in the core, whose ``trig.c``, which the page uses too, has the
@@ -171,3 +171,11 @@ def arc_cos(cosine: Any) -> Any:
 def hypot(x: Any, y: Any) -> Any:
     """Return the length of a vector, for sizes of which squares neither overflow nor vanish."""
     return np.sqrt(x * x + y * y)
+
+
+def bisected(test: Callable[[float], object], low: float, high: float) -> tuple[float, float]:
+    """Return neighbouring values of which a test, true at `high`, is false and true."""
+    least = 1e-15 * high
+    while low < (middle := 0.5 * (low + high)) < high and high - low > least:
+        low, high = (low, middle) if test(middle) else (middle, high)
+    return low, high

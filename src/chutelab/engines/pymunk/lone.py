@@ -28,12 +28,11 @@ from chutelab.engines.pymunk.world import (
     Face,
     Flight,
     World,
-    bisected,
 )
 from chutelab.machine import Machine
 from chutelab.results.record import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder, StalledError, Tracks
-from chutelab.util.arrays import Progress
+from chutelab.util.arrays import Progress, bisected
 
 WEDGED = 1000
 """Iterations of Chipmunk's solver for a disk held by several surfaces, each of which takes off a

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import acos, atan2, ceil, cos, inf, pi, sin, sqrt
@@ -16,7 +15,7 @@ from pymunk import Vec2d
 from chutelab.machine import Arcs, Machine, Segments
 from chutelab.results.loads import Bins
 from chutelab.results.recorder import Recorder
-from chutelab.util.arrays import Floats
+from chutelab.util.arrays import Floats, bisected
 
 PARTICLE, SURFACE = 1, 2
 """Collision types of disks and of everything they meet."""
@@ -593,11 +592,3 @@ class Carriage:
         bins.bear(
             surfaces, times[:-1], times[1:], *self.foot(times[:-1] + 0.5 * span), (y, weight - x)
         )
-
-
-def bisected(test: Callable[[float], object], low: float, high: float) -> tuple[float, float]:
-    """Return neighbouring values of which a test, true at `high`, is false and true."""
-    least = 1e-15 * high
-    while low < (middle := 0.5 * (low + high)) < high and high - low > least:
-        low, high = (low, middle) if test(middle) else (middle, high)
-    return low, high

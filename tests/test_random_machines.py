@@ -148,3 +148,9 @@ def test_what_lies_between_a_falling_stone_and_a_stop_of_its_hinge_holds_the_sto
         "run": {"until": 0.3},
     }  # fmt: skip
     sound(chutelab.simulate(scene, engine="contact"))
+
+
+@pytest.mark.parametrize("seed", [223, 263])
+def test_what_hops_fast_or_is_wedged_on_a_stop_gives_no_energy(seed):
+    """A disk that skids over a corner, and a stone that presses two boards on their stops."""
+    sound(chutelab.simulate(bodies(seed), engine="contact"))

@@ -87,7 +87,7 @@ void describe(Contact *c, int i, int j) {
     if (j < 0 && is_hung(-1 - j)) hang_on(c, W.movers + W.surfaces[-1 - j].mover, a);
     c->rest = pair->restitution, c->falls = pair->falls;
     c->share = 1;
-    c->clings = 0;
+    c->clings = c->lent[0] = c->lent[1] = 0;
     c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx - escapes[0] : 0;
     c->gives = c->turns = 0;
     c->most = INFINITY;
@@ -156,7 +156,8 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
 /* Share what is lost in contacts that were solved together: of a crowd only the sum is known. In a chain
    wedged between walls impulses of any size hold each other; where one of its gaps opens and another
    closes, one seems to give what the other takes. So where the sum is a loss those that gain
-   gain nothing and the others lose so much less; where it is a gain, the other way round. */
+   gain nothing and the others lose so much less; where it is a gain, the other way round, and stops of
+   hinges that they act on lose less. */
 void pool(Contact *list, int count, int later) {
     double sums[2] = {0, 0};
     for (int n = 0; n < count; n++) {
@@ -164,6 +165,13 @@ void pool(Contact *list, int count, int later) {
         for (int k = 1; k < 3; k++) sums[loss[k] < 0] += loss[k];
     }
     double all = sums[0] + sums[1];
+    for (Contact *c = list; c < list + count && all < 0; c++) {
+        if (!c->hung) continue;
+        /* The hinge gives more work to the contact by so much. */
+        c->lent[later] = lent_by_stops(c->hung - 1, -all, later);
+        (later ? c->later : c->entries)[0] += c->lent[later];
+        all += c->lent[later];
+    }
     double shares[2] = {all > 0 ? all / sums[0] : 0, all < 0 ? all / sums[1] : 0};
     for (int n = 0; n < count; n++) {
         double *loss = later ? list[n].later : list[n].entries;

@@ -165,11 +165,12 @@ static inline int is_hung(int k) { return W.surfaces[k].mover >= 0 && W.movers[W
 static inline int stirs(const Surface *s) { return s->mover >= 0 && W.movers[s->mover].stirs; }
 /* Normal impulse of a contact, with what cohesion pulls, N s. */
 static inline double pressed(const Contact *c) { return c->impulse[0] - c->clings; }
+double lent_by_stops(int mover, double wanted, int later);
 double swung(const Contact *c, double f);
 /* Work that the motion of a surface does by a contact's impulses, of which the share f has been given, J. */
 static inline double driven(const Contact *c, double f) {
     double still = (1 - f) * (pressed(c) * c->moved[0] + c->impulse[1] * c->moved[1] + c->impulse[2] * c->moved[2]);
-    return c->hung ? still + swung(c, f) : still;
+    return c->hung ? still + swung(c, f) + c->lent[f > 0] : still;
 }
 /* Whether a particle has joints. */
 static inline int is_tied(int i) { return i >= 0 && W.disks[i].tie >= 0; }

@@ -153,6 +153,7 @@ void begin_hinges(double t, double h) {
         if (!is_hinge(m)) continue;
         bring(m, t);
         m->before = m->rate;
+        m->lent[0] = m->lent[1] = 0;
         m->drift = m->path[2] * h;
         /* Up to the middle of this step; the one before may have ended sooner than it was to. */
         m->most = t >= m->begins ? MAX(t + 0.5 * h - MAX(m->acted, m->begins), 0) * m->motor[1] : 0;
@@ -178,7 +179,17 @@ static double work(const Mover *m, double J, double f) {
 /* Book the work of motors, and what stops take, of the impulses behind the share f; with a sign. */
 static void book_hinge(Mover *m, double f, double sign) {
     m->worked += sign * work(m, m->impulse[2], f);
-    m->stopped -= sign * work(m, m->impulse[0] + m->impulse[1], f);
+    m->stopped -= sign * (work(m, m->impulse[0] + m->impulse[1], f) + m->lent[f > 0]);
+}
+
+/* Have the stops of a hinge lose less by what contacts that were solved with them seem to give, up to so much, J; return
+   by how much. */
+double lent_by_stops(int mover, double wanted, int later) {
+    Mover *m = W.movers + mover;
+    double lost = -work(m, m->impulse[0] + m->impulse[1], later ? W.before : 0) - m->lent[later];
+    double given = MIN(MAX(lost, 0), wanted);
+    m->lent[later] += given;
+    return given;
 }
 
 /* Have a hinge be where it is at t, when it is struck: the step ends there. */
@@ -196,7 +207,7 @@ void stop_hinges(double t) {
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!is_hinge(m)) continue;
         strike_hinge((int)(m - W.movers), t);
-        m->drift = m->most = 0;
+        m->drift = m->most = m->lent[0] = m->lent[1] = 0;
         for (int n = 0; n < 3; n++) m->impulse[n] = 0;
         m->need[0] = m->angle <= m->stops[0] + AGAINST ? -m->rate : -INFINITY;
         m->need[1] = m->angle >= m->stops[1] - AGAINST ? -m->rate : INFINITY;

@@ -177,6 +177,7 @@ typedef struct {
     double stops[2];        /* [in] rad; between which it turns */
     double motor[2];        /* [in] rad/s, N m; speed, and the most that it turns with */
     double worked, stopped, damped; /* [out] J; work of its motor, losses at its stops and in its damper */
+    double lent[2];         /* J; by how much stops lose less by this step's impulses, and by its share of them */
     double torque, pushed;  /* N m; by which it is pushed by hand; [out] J; and the work of that */
     double t;               /* s; when it is as follows */
     double place[2], velocity[2], pull[2]; /* m, m/s, m/s2; of the pivot */
@@ -272,6 +273,7 @@ typedef struct {
     double entries[3], later[3]; /* J; what its impulses do to the ledger, and what the part of them
                                     does that belongs to this step; see `account` */
     double given[2];        /* J; the same for the belt that carries the partner */
+    double lent[2];         /* J; in both, work of the hinge that its stops do not take */
     double turns;           /* m/s2; by which a hollow turns the way of a disk in a crowd, else 0 */
     double free_gap, bend;     /* m; its gap at the step's end without impulses, and what they change of it
                                but for the straight way: see `bends` */

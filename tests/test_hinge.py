@@ -382,6 +382,27 @@ def test_a_particle_inside_what_hangs_breaks_a_law():
     assert "lever" in {one.surface for one in judge(spoilt)}
 
 
+@pytest.mark.parametrize("torque", [0.0, 0.3])
+def test_bars_tell_what_a_motor_gives_from_what_the_hinge_keeps_and_its_stop_takes(torque):
+    """All along they are the whole ledger of a run that ends then."""
+    from chutelab.pictures.plots.scenery import energies
+
+    keys = {"mass": 0.2, "damper": 0.002, "spring": 0.5, "stops_deg": [-20.0, 30.0]}
+    if torque:
+        keys["motor"] = {"speed_deg": 100.0, "torque": torque}
+    stream = {"at": [0.3, 0.2], "velocity": [0.0, 0.0]}
+    recording = run(stream, **keys)
+    for until in (0.15, 0.5, 1.0):
+        whole = run(stream, run={"until": until}, **keys).ledger
+        bars = {name: one[0] for name, one in energies(recording, np.array([until])).items()}
+        off = 1e-3 * whole.turned_over
+        assert bars["belt_work"] == pytest.approx(whole.drive_work, abs=off)
+        assert torque or abs(bars["belt_work"]) < 1e-6
+        for name in ("restitution_loss", "friction_loss", "damper_loss"):
+            assert bars[name] == pytest.approx(getattr(whole, name), abs=off)
+        assert abs(bars["residual"]) < 1e-9
+
+
 def test_a_film_draws_it_where_it_is_and_a_picture_where_it_ends():
     from chutelab.pictures.animation.actors import gates
     from chutelab.pictures.plots import Picture, draw_view

@@ -148,3 +148,8 @@ def test_what_lies_between_a_falling_stone_and_a_stop_of_its_hinge_holds_the_sto
         "run": {"until": 0.3},
     }  # fmt: skip
     sound(chutelab.simulate(scene, engine="contact"))
+
+
+def test_what_hops_fast_gives_no_energy():
+    """A disk that skids over a corner."""
+    sound(chutelab.simulate(bodies(223), engine="contact"))

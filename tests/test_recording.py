@@ -13,7 +13,7 @@ from scipy.special import ellipj
 
 from chutelab import machine, scene
 from chutelab.engines import contact, exact
-from chutelab.engines.simulation import choose
+from chutelab.engines.simulation import choose, simulate
 from chutelab.machine import Particle
 from chutelab.results import ENTRIES, KNOT, Kind, record
 from chutelab.results.ledger import energy_at, ledger
@@ -364,6 +364,14 @@ def test_a_track_is_off_by_less_than_a_hop_and_the_run_stays_as_it_is(name):
     assert far(short) <= 4.0
     assert np.nanmax(np.hypot(*np.moveaxis(short.at(times)[1] - paces, -1, 0))) <= 2.0 * g * dt
     assert far(crowded(name, hops=30.0)) > 4.0
+
+
+@pytest.mark.parametrize("name", ["see-saw", "cradle"])
+def test_what_a_step_of_no_length_releases_leaves_nothing_over_then(name):
+    run = simulate(name)
+    assert (run.totals["t"][:2] == 0.0).all()
+    now = energy_at(run, [0.0])
+    assert abs(now["residual"][0]) <= 1e-12 * (1e-3 + abs(now["potential"][0]))
 
 
 @pytest.mark.parametrize("name", CROWDS)

@@ -23,7 +23,7 @@ from chutelab.util.files import aside, together, whole
 
 ARRAYS = (
     "knots", "offsets", "ended", "events", "by_surface", "angle", "totals", "unsolved", "drives",
-    "impulses", "lasting", "swings", "hinge_work", "springs", "triggered",
+    "impulses", "lasting", "swings", "hinge_work", "stopped", "springs", "triggered",
 )  # fmt: skip
 
 

@@ -219,26 +219,31 @@ static void fill_in(const Shape *a, const Shape *b, Touch *t) {
     t->ny = n[1];
 }
 
-/* The side of a segment that a corner is on: its own. If it may have sunk through, that on which both its edges are,
-   else that of the centre. */
+/* The side of a segment that a corner is on: its own. Where the line from it to the centre, which is inside the shape,
+   crosses the segment, it has sunk through, and is on the side of the centre. */
 static int side_of(const Shape *a, const Surface *s, int corner, double near) {
-    const double *q = a->p[corner];
-    double off = (q[1] - s->y) * s->tx - (q[0] - s->x) * s->ty, low = INFINITY, high = -INFINITY;
-    double mid = (a->y - s->y) * s->tx - (a->x - s->x) * s->ty, along = (a->x - s->x) * s->tx + (a->y - s->y) * s->ty;
+    double x = a->p[corner][0] - s->x, y = a->p[corner][1] - s->y, u = a->x - s->x, v = a->y - s->y;
+    double off = y * s->tx - x * s->ty, mid = v * s->tx - u * s->ty, both = fabs(off) + fabs(mid);
     int own = off >= 0 ? 1 : -1, centre = mid >= 0 ? 1 : -1;
-    if (own == centre || fabs(off) > 2 * near) return own;
-    for (int n = 1; n < a->count; n += a->count - 2) {
-        const double *next = a->p[(corner + n) % a->count];
-        double up = (next[1] - q[1]) * s->tx - (next[0] - q[0]) * s->ty;
-        low = MIN(low, up);
-        high = MAX(high, up);
-    }
-    if (low > -2 * near || high < 2 * near) return low + high > 0 ? 1 : -1;
-    if (along >= 0 && along <= s->length) return centre;
-    double n[2], out, *end = (double *)s->end + (along < 0 ? 0 : 2);
-    int edge = furthest(a, end, &out);
-    out_of(a, edge, n);
-    return out < 0 || fabs(n[1] * s->tx - n[0] * s->ty) > FLAT ? centre : own;
+    if (own == centre) return own;
+    double cut = ((x * s->tx + y * s->ty) * fabs(mid) + (u * s->tx + v * s->ty) * fabs(off)) / both;
+    return cut >= -near && cut <= s->length + near ? centre : own;
+}
+
+/* Whether a corner is inside the circle of an arc: on its own, or by the centre where the line to it, inside the shape,
+   crosses the arc. */
+static int is_inside(const Shape *a, const Surface *s, int corner) {
+    double x = a->p[corner][0] - s->x, y = a->p[corner][1] - s->y, u = a->x - s->x, v = a->y - s->y;
+    double off = x * x + y * y - square(s->radius);
+    int own = off <= 0, centre = u * u + v * v < square(s->radius);
+    if (own == centre) return own;
+    u -= x;
+    v -= y;
+    double whole = u * u + v * v, half = x * u + y * v, root = sqrt(half * half - whole * off);
+    double cut = ((own ? root : -root) - half) / whole;
+    x += cut * u;
+    y += cut * v;
+    return s->shape == CIRCLE || x * s->tx + y * s->ty >= s->cos_half * s->radius ? centre : own;
 }
 
 /* Find what a candidate is on; 0 if it is none that touches. */
@@ -254,10 +259,9 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
         }
         if (b->s) {
             double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);
-            double mid = length_of(a->x - b->s->x, a->y - b->s->y);
             t->on = 0;
             fill_in(a, b, t);
-            if (fabs(d - b->radius) <= 2 * near ? mid >= b->radius : d > b->radius) return 0;
+            if (!is_inside(a, b->s, t->which)) return 0;
             return b->s->shape == CIRCLE || x * b->s->tx + y * b->s->ty >= b->s->cos_half * d;
         }
         if (b->round >= 0) {

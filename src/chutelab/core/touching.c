@@ -113,6 +113,8 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
        on it in each step. */
     double cohesion = cohesion_of(i, j);
     const Contact *last = place ? place_before(c) : 0;
+    for (int k = place ? -1 : d->before; k >= 0; k = W.earlier[k].next)
+        if (goes_on(W.earlier[k].j, j)) last = W.earlier + k;
     /* N s; what cohesion has held since the step before: of a new contact, what it would have held since the
        latest blow or release. */
     double parts = MAX(W.soft + haste, soft_approach(d, least)), since = d->since;

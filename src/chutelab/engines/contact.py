@@ -300,7 +300,9 @@ class Job:
                 by_hand = recorder.drives[row["surface"]], 0.0, 0.0, 0.0
                 recorder.hinge_work[row["surface"]] = by_hand if row["steered"] else work
             swings = module.array("swings", dtype("Swing"), world.swing_count).view(SWING)
-            recorder.swings = swings[np.argsort(swings["surface"], kind="stable")]
+            order = np.argsort(swings["surface"], kind="stable")
+            taken = module.array("swing_work", REAL, 3 * world.swing_count).reshape(-1, 3)
+            recorder.swings, recorder.stopped = swings[order], taken[order, 0]
         joints = module.array("joints", dtype("Joint"), world.joint_count)
         springs = joints[joints["kind"] == JOINTS.index("spring")]
         recorder.springs = np.column_stack([springs["kept"], springs["damped"], springs["given"]])

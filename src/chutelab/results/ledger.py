@@ -324,6 +324,8 @@ def _as_totals(recording: Record, times: Floats, found: Floats) -> Floats:
     )
     sums = np.concatenate([np.zeros((2, 1)), at_release.cumsum(axis=1)], axis=1)
     before, after = (sums[:, np.searchsorted(begun, t, side=side)] for side in ("left", "right"))
+    # A step of no length, after which they are noted once more, has released what begins then.
+    before[:, 1:] = np.where(t[1:] > t[:-1], before[:, 1:], after[:, 1:])
     told = np.stack(
         [recording.totals["kinetic"], recording.totals["potential"], *recording.totals["entries"].T]
     )

@@ -307,6 +307,9 @@ class Record(Shown):
     hinge_work : ndarray, shape (len(surfaces), 4) or (0, 4)
         J; of what hangs on hinges the work of its motor, losses at its stops and in its damper, and
         the work of pushes by hand. Empty where nothing does.
+    stopped : ndarray, shape (K,) or (0,)
+        J; of each of `swings` what the stops of its hinge have taken until then. Of the contact
+        engine.
     springs : ndarray, shape (S, 4)
         J; of each ``[[spring]]`` what it kept when it was tied, what it keeps at the end, what its
         damper took, and what it gave to particles, which is part of their belt work in the knots.
@@ -335,6 +338,7 @@ class Record(Shown):
     lasting: NDArray[Any] = field(default_factory=lambda: np.empty(0, LASTING))
     swings: NDArray[Any] = field(default_factory=lambda: np.empty(0, SWING))
     hinge_work: Floats = field(default_factory=lambda: np.zeros((0, 4)))
+    stopped: Floats = field(default_factory=lambda: np.zeros(0))
     springs: Floats = field(default_factory=lambda: np.zeros((0, 4)))
     triggered: Floats = field(default_factory=lambda: np.zeros(0))
 
@@ -345,6 +349,7 @@ class Record(Shown):
             "lasting",
             "swings",
             "hinge_work",
+            "stopped",
             "springs",
             "triggered",
         ):

@@ -81,7 +81,7 @@ class Recorder:
         self.ended = np.zeros(count, dtype=np.int8)
         self.drives = np.zeros(owners)
         self.swings = np.empty(0, SWING)
-        self.hinge_work = np.zeros((owners, 4))
+        self.hinge_work, self.stopped = np.zeros((owners, 4)), np.zeros(0)
         self.springs = np.zeros((0, 4))
         self.triggered = np.full(len(machine.triggers), np.inf)
         self.contacts = 0
@@ -262,6 +262,7 @@ class Recorder:
             drives=self.drives if self.machine.movers or len(self.swings) else np.zeros(0),
             swings=self.swings,
             triggered=self.triggered,
+            stopped=self.stopped,
             springs=self.springs,
             hinge_work=self.hinge_work if len(self.swings) else np.zeros((0, 4)),
             steps=steps,

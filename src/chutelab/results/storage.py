@@ -67,6 +67,7 @@ ARRAYS = {
     "lasting": LASTING,
     "swings": SWING,
     "hinge_work": np.dtype("f8"),
+    "stopped": np.dtype("f8"),
     "springs": np.dtype("f8"),
     "triggered": np.dtype("f8"),
 }
@@ -80,7 +81,7 @@ UNPACKED = ("knots", "angle", "events")
 
 MAYBE = (
     "angle", "totals", "unsolved", "drives", "impulses", "lasting", "swings",
-    "hinge_work", "springs", "triggered",
+    "hinge_work", "stopped", "springs", "triggered",
 )  # fmt: skip
 """Those that are left out where they are empty."""
 
@@ -293,6 +294,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     }  # fmt: skip
     numbers["gained"] = np.array([recording.gained, recording.air_loss], dtype=float)
     numbers |= {"hinge_work": recording.hinge_work, "springs": recording.springs}
+    numbers["stopped"] = recording.stopped
     for name in ("knots", "events", "totals", "impulses", "lasting", "swings"):
         array = getattr(recording, name)
         numbers |= {f"{name}.{key}": array[key] for key in array.dtype.names or ()}
@@ -323,6 +325,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         and recording.by_surface.shape == (surfaces, len(ENTRIES))
         and recording.drives.shape == ((surfaces,) if recording.machine.movers else (0,))
         and recording.hinge_work.shape == ((surfaces if len(recording.swings) else 0), 4)
+        and recording.stopped.shape in ((0,), recording.swings.shape)
         and recording.springs.shape == (len(recording.scene.spring), 4)
         and recording.triggered.shape == (len(recording.machine.triggers),)
         and not np.any(np.isnan(recording.triggered))

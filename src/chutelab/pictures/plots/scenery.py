@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.core import number as layout_number
-from chutelab.machine.parts import Hinge
+from chutelab.machine.parts import Mover
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.quantities import each
@@ -191,17 +191,27 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
             break
     balance["potential"] = np.maximum(lifted, 0.0)
     balance["start"] = at_release[released] - weight * zero
-    hinges = [one.hinge for one in recording.machine.movers if one.hinge]
-    if hinges and paid_by(recording) == "drives":
+    hung = [one for one in recording.machine.movers if one.hinge]
+    if hung and paid_by(recording) == "drives":
         balance |= {"spring": np.zeros_like(times), "damper_loss": np.zeros_like(times)}
-        for one in hinges:
+        for one in hung:
             _hang(balance, one, recording, times)
     return balance
 
 
-def _hang(balance: dict[str, Floats], hinge: Hinge, recording: Recording, times: Floats) -> None:
-    """Put what hangs on a hinge into a ledger at times (T,), J; what touches it gives all of it."""
+def _hang(balance: dict[str, Floats], mover: Mover, recording: Recording, times: Floats) -> None:
+    """Put what hangs on a hinge into a ledger at times (T,), J.
+
+    Of what it has, and its damper and its stops took, what touches it has given as much as it
+    lost; the rest is its motor's work, on the row of all drives.
+    """
+    hinge = mover.hinge
+    assert hinge is not None
     own, t = hinge.states, hinge.states["t"]
+    stopped = np.zeros_like(times)
+    if len(recording.stopped):
+        taken = recording.stopped[recording.swings["surface"] == mover.surface]
+        stopped = np.interp(times, t, taken)
     # Gauss's rule of three places is exact for the square of a parabola, the rate between states.
     places, weights = np.polynomial.legendre.leggauss(3)
     within = t[:-1, None] + 0.5 * np.diff(t)[:, None] * (1.0 + places)
@@ -216,8 +226,9 @@ def _hang(balance: dict[str, Floats], hinge: Hinge, recording: Recording, times:
         balance[name] = balance[name] + energy
     balance["potential"] -= lowest
     balance["damper_loss"] = balance["damper_loss"] + damped
+    balance["restitution_loss"] = balance["restitution_loss"] + stopped
     balance["start"] = balance["start"] + sum(begun) - lowest
-    balance["belt_work"] = balance["belt_work"] + sum(now) - sum(begun) + damped
+    balance["belt_work"] = balance["belt_work"] + sum(now) - sum(begun) + damped + stopped
 
 
 def flow(recording: Recording) -> dict[str, Floats]:
@@ -283,11 +294,12 @@ def drawn_tracks(recording: Recording) -> Ints:
 def paid_by(recording: Recording) -> str:
     """Return what gives the energy that pictures show: "belt_work", "drives", or "hinges", too.
 
-    What stops take, and motors and hands give, is known of whole runs only: there it is what hangs
-    on a hinge that gives energy, or takes it, and has none of its own.
+    What hands do to plates, and in Pymunk what stops take, is known of whole runs only: there it is
+    what hangs on a hinge that gives energy, or takes it, and has none of its own.
     """
     hinges = [one.hinge for one in recording.machine.movers if one.hinge]
-    if any(one.steered or one.motor[1] or np.isfinite(one.stops).any() for one in hinges):
+    untold = not len(recording.stopped)
+    if any(one.steered or (untold and np.isfinite(one.stops).any()) for one in hinges):
         return "hinges"
     return "drives" if recording.machine.movers else "belt_work"
 

@@ -343,17 +343,10 @@ class Record(Shown):
     triggered: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        arrays = "knots offsets ended events by_surface angle totals unsolved drives impulses"
-        for name in (
-            *arrays.split(),
-            "lasting",
-            "swings",
-            "hinge_work",
-            "stopped",
-            "springs",
-            "triggered",
-        ):
-            getattr(self, name).flags.writeable = False
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
         if len(self.triggered):
             object.__setattr__(self, "machine", self.machine.when(self.triggered))
         if len(self.swings):

@@ -317,6 +317,20 @@ def test_random_machines_keep_the_laws(seed):
     sound(chutelab.simulate(drawn(seed), engine="contact"))
 
 
+@pytest.mark.parametrize("keys", [{"damper": 7e-3}, {"spring": 4.0, "rest_deg": 0.0}])
+def test_what_lies_at_its_stop_is_struck_and_stays_there(keys):
+    """A ball turns it beyond the stop at some 10 rad/s; the stop, once a step, takes that whole.
+
+    Its damper, and its spring, take of the angle that this rate comes to in a step (times 1.7e-5
+    kg m²: 400/s and 480/s), which the stop must not count as turned.
+    """
+    stream = {"at": [0.045, 0.2], "velocity": [0.0, 0.0]}
+    hung = {"inertia": 1.7e-5, "stops_deg": [0.0, 20.0], "restitution": 0.0, "run": {"until": 0.4}}
+    recording = run(stream, to=[0.09, 0.0], hinge=[0.0, 0.0], **hung, **keys)
+    assert recording.select("impact").size
+    assert recording.swings["angle"].min() > -1e-6
+
+
 def test_a_pair_of_blow_and_friction_that_feel_each_other_gives_no_energy():
     """A pivot off the line of the plate couples them; with e = 1, too, nothing is gained."""
     for x, y in np.random.default_rng(4).uniform(-0.3, 0.3, (40, 2)):

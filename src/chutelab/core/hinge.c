@@ -64,6 +64,19 @@ static void follow_path(const Mover *m, double h, double *angle, double *rate, d
     }
 }
 
+/* By how much its angle is larger a time h after its rate was made larger, s: damper and spring take of it. */
+static double yields(const Mover *m, double h) {
+    double before = 0, term = 1, power = 1, sum = 0;
+    for (int k = 1; k < TERMS; k++) {
+        double next = -(m->damper * k * term + m->spring * before) / (m->inertia * k * (k + 1));
+        power *= h;
+        sum += term * power;
+        before = term;
+        term = next;
+    }
+    return sum;
+}
+
 /* Put a hinge where it is at t. */
 void set_hinge(Mover *m, double t) {
     double angle;
@@ -163,7 +176,7 @@ void begin_hinges(double t, double h) {
             /* As with joints, a short step takes back as small a share of what is beyond. */
             double beyond = n ? MAX(m->angle - m->stops[n], 0) : MIN(m->angle - m->stops[n], 0);
             double least = m->stops[n] + beyond * (1 - MIN(h / W.usual, 1));
-            m->need[n] = touches ? (least - angle) / h : n ? INFINITY : -INFINITY;
+            m->need[n] = touches ? (least - angle) / yields(m, h) : n ? INFINITY : -INFINITY;
             m->impulse[n] *= touches ? share : 0;
         }
         m->impulse[2] = MIN(MAX(share * m->impulse[2], -m->most), m->most);

@@ -231,14 +231,14 @@ static void carry_to_end(int i, int first, double h) {
     last->need += 0.5 * MAX(press, 0) * until;
 }
 
-/* The same at places at which a particle with corners touches j. */
+/* Add a contact at each place at which a particle with corners touches j. */
 static RARELY int add_places(int i, int j, double bound, double h, const Touch *places, int count) {
     for (int n = 0; n < count; n++)
         if (!add(i, j, inner_of(i, j), bound, h, places + n)) return 0;
     return 1;
 }
 
-/* ... and list them before. */
+/* List these places, as they are now, for a step of a length h; return how many. */
 static int list_places(int i, int j, double h, Touch *places) {
     return list_touches(i, j, W.t, TOUCH * inner_of(i, j), W.t + h, places);
 }

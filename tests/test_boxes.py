@@ -410,7 +410,7 @@ def test_poured_boxes_get_into_each_other_and_into_walls_as_little_as_disks_do(c
 @pytest.mark.slow
 def test_the_ledger_closes_and_nothing_gains_however_far_sweeps_have_come(with_fault):
     """What is lost is told by the impulses and velocities that were applied, not by a solution."""
-    rounds = "MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), W.sweeps,"
+    rounds = "MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), sweeps,"
     with_fault("solver.c", rounds, "1, 2,")
     recording = poured(25, 0.4)[0]
     assert recording.unsolved.max() > 1e-3

@@ -943,8 +943,8 @@ RARELY void strike_corners(int i, int j, double t) {
         if (j < 0 && c->impulse[0] > 0) hold(a, -1 - j);
         bear_contact(c, 1, t, t);
         if (c->impulse[0] > main->impulse[0]) main = c;
-        if (c->hung) leave_struck(c->hung - 1);
     }
+    if (main->hung) leave_struck(main->hung - 1);
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         double x = c->impulse[0] * c->nx + c->impulse[1] * c->ny, y = c->impulse[0] * c->ny - c->impulse[1] * c->nx;

@@ -633,6 +633,7 @@ typedef struct {
     int most, window;       /* [in] rounds of a particle; progress check interval, in rounds */
     double tick;            /* [in] s over its pace; mean time between events below which it does not */
     double far;             /* [in] m; how far off the coordinates were rounded */
+    double loose;           /* [in] what ON_ARCS is more for this run */
     int laid, begun;        /* number after the member whose obstacles are laid; whether `lone` is */
     /* [out] */
     int knot_count, event_count, contacts, rounds; /* rounds: of the particle that took most */
@@ -826,6 +827,7 @@ typedef struct {
     double gained;          /* [in] J; by which solves broke their law of energy */
     double unsolved;        /* [in] radii; the most overlap that the solve of a step left beyond what it asked for */
     double largest;         /* [in] m; radius of the largest particle, with its corners */
+    double loose;           /* [in] what ON_ARCS is more for this run */
     /* [out] */
     int breach_count, hit_count;
     double speed;           /* m/s; the largest of anything that moves, belts included */

@@ -267,6 +267,19 @@ class Machine:
         return 0.0 if self.family is not None else self.scene.run.stress or 0.0
 
     @cached_property
+    def loose(self) -> float:
+        """By which tracks may be further off circles between two knots, as a share of the radius.
+
+        0 but of a family, of which nothing is read there: what its laws do not see is less than a
+        ten thousandth of a particle's radius.
+        """
+        if self.family is None:
+            return 0.0
+        bends = [self.arcs.radius, *([] if self.pulley is None else [self.pulley.radius])]
+        widest = max((float(np.max(one)) for one in bends if np.size(one)), default=inf)
+        return min(1e-6, 1e-4 * float(np.min(self.particle.radius)) / widest)
+
+    @cached_property
     def count(self) -> int:
         """Number of particles."""
         return len(self.releases.t)

@@ -56,18 +56,12 @@ static int joins(const Contact *c, double *u, int *owner) {
     return 1;
 }
 
-/* Let islands fall asleep that have been at rest for long enough, after a step's solve. */
+/* Let islands fall asleep that have been at rest for long enough, after a step's solve, which has left the islands
+   in `W.queue`. */
 void fall_asleep(void) {
-    int *parent = W.queue, ready = 0;
-    for (int i = W.low; i < W.high; i++) {
-        parent[i] = i;
-        ready += W.disks[i].mode == FREE && W.disks[i].rest >= CALM_DOWN / W.pace;
-    }
-    if (!ready || !W.sleeps) return;
-    for (int n = 0; n < W.contact_count; n++) {
-        const Contact *c = W.contacts + n;
-        if (c->two) parent[island_of(c->i)] = island_of(c->j);
-    }
+    int ready = 0;
+    for (int i = W.low; i < W.high; i++) ready |= W.disks[i].mode == FREE && W.disks[i].rest >= CALM_DOWN / W.pace;
+    if (!ready || !W.sleeps || !W.contact_count) return;
     /* Of each island, at its root: may it sleep, and how do its surfaces move? `found` counts the
        disks that may not, `ux`, `uy` are free to hold the velocity once the step is closed. */
     for (int i = W.low; i < W.high; i++) {
@@ -78,6 +72,9 @@ void fall_asleep(void) {
         const Disk *d = W.disks + i;
         if (d->mode == FREE && d->rest < CALM_DOWN / W.pace) W.found[island_of(i)]++;
     }
+    ready = 0;
+    for (int i = W.low; i < W.high && !ready; i++) ready = W.disks[i].mode == FREE && !W.found[island_of(i)];
+    if (!ready) return;
     for (int n = 0; n < W.contact_count; n++) {
         const Contact *c = W.contacts + n;
         int k = island_of(c->i);

@@ -335,6 +335,7 @@ class _Names:
                 style.plain(self._said(surface, parts[0][0])), (0.0, 0.0),
                 xytext=(0.0, 0.0), textcoords="offset points", fontsize=style.SMALL,
                 color=color, path_effects=halo(), zorder=5.0,
+                gid=f"name {self.machine.surfaces[surface]}",
             )  # fmt: skip
             best: tuple[int, Spot, Bbox] | None = None
             for spot in self._spots(parts):

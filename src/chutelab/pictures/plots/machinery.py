@@ -424,6 +424,7 @@ class _Names:
             for where, away in (
                 ((x, bottom), (0.0, -1.0)), ((x, top), (0.0, 1.0)),
                 ((right_, y), (1.0, 0.0)), ((left, y), (-1.0, 0.0)),
+                ((left, bottom), (-0.7, -0.7)), ((right_, bottom), (0.7, -0.7)),
             ):  # fmt: skip
                 yield _spot(np.array(where), farther * GAP, np.array(away))
 

@@ -299,7 +299,8 @@ class Machine:
         """
         if self.family is None:
             return 0.0
-        bends = [self.arcs.radius, *([] if self.pulley is None else [self.pulley.radius])]
+        bends: list[Any] = [self.arcs.radius]
+        bends += [] if self.pulley is None else [self.pulley.radius]
         widest = max((float(np.max(one)) for one in bends if np.size(one)), default=inf)
         return min(1e-6, 1e-4 * float(np.min(self.particle.radius)) / widest)
 

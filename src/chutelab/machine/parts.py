@@ -280,13 +280,14 @@ class Machine:
         columns = {key: numbers[some] for key, numbers in self.family.columns.items()}
         parts = {name: getattr(self, name) for name in ("segments", "arcs", "pulley")}
         kind = np.zeros(self.family.each, dtype=np.int64)
+        ends: Any = np.broadcast_to(self.end_time, self.count)[some]
         return replace(
             self,
             scenes=replace(self.family, columns=columns),
             gravity=np.broadcast_to(self.gravity, self.count)[first].item(),
             particle=self.particle.of(some),
             releases=replace(self.releases, **{**own(self.releases, some), "kind": kind}),
-            end_time=np.broadcast_to(self.end_time, self.count)[some],
+            end_time=ends,
             **{name: part and replace(part, **own(part)) for name, part in parts.items()},
         )
 

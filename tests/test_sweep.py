@@ -118,7 +118,7 @@ perpendicular | stream.count=3 run.until=0.5 | stream.rate=1,10,100 plate.restit
 """A scene, what is set, what is varied."""
 
 
-@pytest.mark.parametrize("line", some(FAMILIES.strip().splitlines(), 2))
+@pytest.mark.parametrize("line", some(FAMILIES.strip().splitlines()))
 def test_rows_of_a_batch_are_those_of_single_runs(line):
     name, settings, varies = (part.split() for part in line.split("|"))
     block = block_of(load(*name, settings), varies)

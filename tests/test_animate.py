@@ -569,6 +569,48 @@ def test_a_gate_is_seen_while_it_is_there():
     ]  # fmt: skip
 
 
+def test_names_go_along_with_what_leaves_its_place():
+    turning = """
+        [[surface]]
+        name = "{name}"
+        from = [{x}, -0.02]
+        to = [{x}, 0.02]
+        {moves}
+    """
+    turns = "pivot = [0.0, 0.0]\nturn = 90.0"
+    shakes = "shake = { by = [0.0, 0.002], frequency = 5.0 }"
+    text = """
+        [run]
+        until = 2.1
+        [particle]
+        radius = 0.01
+        [stream]
+        count = 1
+        at = [0.0, 0.3]
+        velocity = [0.0, 0.0]
+    """ + "".join(
+        turning.format(name=name, x=x, moves=moves)
+        for name, x, moves in (("one", -0.2, turns), ("two", 0.2, turns), ("near", 0.1, shakes))
+    )
+    recording = simulate(scene.parse(text))
+    layout = laid_out(recording)
+    wide = Window(-0.4, 0.4, -0.4, 0.4).fitted(layout.window.width / layout.window.height)
+    times = (0.0, 0.5, 1.0, 2.0)
+    stage = stage_of(recording, moments_at(times), layout=replace(layout, window=wide))
+    for index, t in enumerate(times):
+        drawn = moved(stage, index)
+        assert {gid for gid in drawn if "name" in gid} == {"name one", "name two"}
+        for name, side in (("one", -1.0), ("two", 1.0)):
+            turned = np.radians(90.0) * t
+            middle = stage.view.transData.transform(
+                (side * 0.2 * np.cos(turned), side * 0.2 * np.sin(turned))
+            )
+            box = drawn[f"name {name}"].get_window_extent()
+            away = np.maximum(np.maximum(box.min - middle, middle - box.max), 0.0)
+            # Half of its surface's length, and the gap beside it.
+            assert np.hypot(*away) < 0.02 / wide.width * stage.view.get_window_extent().width + 12.0
+
+
 def test_a_film_of_many_is_of_all_of_them_to_the_end():
     spots = [(0.015 * (i % 40) - 0.3, 0.01 + 0.015 * (i // 40)) for i in range(400)]
     machine = machine_of(

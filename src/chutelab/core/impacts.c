@@ -198,8 +198,10 @@ void foresee_all(void) {
         int partner = ALARM;
         d->heap_place = -1;
         d->due = INFINITY;
-        if (d->mode == WAITING) d->due = MAX(d->release, W.now);
-        else if (d->mode == RIDING) d->due = d->ride_to;
+        if (d->mode == WAITING) {
+            d->due = MAX(d->release, W.now);
+            if (d->due < W.step_end) expect(i, d->due, ALARM);
+        } else if (d->mode == RIDING) d->due = d->ride_to;
         else if (d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs)))
             foresee_surfaces(i, &d->due, &partner);
         d->partner = partner;
@@ -209,9 +211,9 @@ void foresee_all(void) {
         if (W.disks[i].mode != FREE) { int k = i; i = j; j = k; }
         if (W.disks[i].mode == FREE) foresee_pair(i, j, &W.disks[i].due, &W.disks[i].partner);
     }
-    for (int i = W.low; i < W.high; i++)
+    for (EACH_LIVE(i))
         if (W.disks[i].due < W.step_end) expect(i, W.disks[i].due, W.disks[i].partner);
-    for (int i = W.low; i < W.high; i++)
+    for (EACH_LIVE(i))
         if (W.disks[i].far) foresee(i);
 }
 

@@ -394,6 +394,7 @@ typedef struct {
     int *queue;          /* (disks + 1) */
     int *moved;          /* (disks) */
     int *found;          /* (2 disks) */
+    int *live;           /* (disks) those that ride, fly, lie or sleep in this step, ascending */
     int *nearby;         /* (disks, MAX_NEARBY) surfaces near each, ascending */
     int *everything;     /* (surfaces) 0, 1, ... */
     int *ends;           /* (2 surfaces) ends of segments and arcs, sorted by place ... */
@@ -443,12 +444,14 @@ typedef struct {
     int stalled;         /* which disk */
     double air_loss;     /* J; what air has taken */
     double released;     /* J; what disks had at their releases */
+    double ended[5];     /* J; what those of a crowd that ended had then: kinetic, potential, entries */
     double push_work;    /* J; what pushes by hand have given */
     double gained;       /* J; by which solves broke their law of energy, see `check_solve` */
     double unsolved;     /* radii; the most overlap that the solve of this step leaves beyond what it asks for */
     double unsolved_most; /* ... and of all steps so far */
     /* within the step */
     int low, high;       /* disks that this part of the run is about */
+    int live_count;
     int phase, cell_count, heap_count, moved_count, wide_count;
     int stirs;           /* whether something moves in this step */
     int passes;          /* some kinds pass through each other: their restitution is below 0 */
@@ -633,6 +636,7 @@ typedef struct {
     int most, window;       /* [in] rounds of a particle; progress check interval, in rounds */
     double tick;            /* [in] s over its pace; mean time between events below which it does not */
     double far;             /* [in] m; how far off the coordinates were rounded */
+    double loose;           /* [in] what ON_ARCS is more for this run */
     int laid, begun;        /* number after the member whose obstacles are laid; whether `lone` is */
     /* [out] */
     int knot_count, event_count, contacts, rounds; /* rounds: of the particle that took most */
@@ -826,6 +830,7 @@ typedef struct {
     double gained;          /* [in] J; by which solves broke their law of energy */
     double unsolved;        /* [in] radii; the most overlap that the solve of a step left beyond what it asked for */
     double largest;         /* [in] m; radius of the largest particle, with its corners */
+    double loose;           /* [in] what ON_ARCS is more for this run */
     /* [out] */
     int breach_count, hit_count;
     double speed;           /* m/s; the largest of anything that moves, belts included */

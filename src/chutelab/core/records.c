@@ -100,7 +100,7 @@ static int judge_exact(void) {
                 .piece_count = e->segment_count + e->arc_count + e->wheel_count,
                 .pulley = e->wheel_count, .books = e->books, .surface_count = e->surface_count,
                 .book_rows = e->surface_count * (e->apart ? e->lone_count : 1),
-                .contacts = e->contacts, .steps = e->rounds };
+                .contacts = e->contacts, .steps = e->rounds, .loose = e->loose };
     take_events(e->events, e->event_count);
     take_knots(e->knots, e->knot_count);
     if (!lay_out_pieces()) return 0;

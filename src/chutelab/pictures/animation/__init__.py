@@ -35,6 +35,7 @@ from chutelab.pictures.animation.actors import (
     crowd,
     drives,
     gates,
+    names,
     seen,
     strobe,
     strung,
@@ -232,6 +233,7 @@ class Stage:
             handles.append(Line2D([], [], color=style.INK, lw=2.0, label=say("velocity")))
         _add_legend(view, handles, components=layout.arrow > 0.0)
         self.moving += bodies(view, recording, np.array([0]), times, "disk", style.STRIKE, 0.4)
+        self.moving += names(view, recording.machine, times)
         self.writings = self._add_text(layout, pace_words(slow), moments)
         if "energy" in shows:
             # Above the bars is room for their title, and the clock.

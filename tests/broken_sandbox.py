@@ -2,7 +2,6 @@
 
 import copy
 import re
-from math import inf, nan
 
 MACHINE = {
     "title": "All parts",
@@ -312,29 +311,6 @@ def leaves(value, path=""):
     return [path.removeprefix(".")]
 
 
-WRONG = ({"x": 1.0}, nan, [[1.0]], True, inf, "wrong")
-"""What stands where a number belongs, in turn."""
-
-
-def of_wrong_type():
-    """Return a variant for every leaf of the scenes that is no text."""
-    found = []
-    for name, base in BASES.items():
-        for n, path in enumerate(leaves(base)):
-            value = at(base, path)
-            wrong = (
-                WRONG[n % len(WRONG)]
-                if type(value) in (int, float)
-                else 7
-                if value is True
-                else [7]
-            )
-            # A range is a number or a list: of neither the whole is shown.
-            key = path.partition("radius[")[0] + "radius" if "radius[" in path else path
-            found.append((name, {path: wrong}, key, "must be"))
-    return found
-
-
 def at(tables, path):
     for step in steps(path):
         tables = tables[step]
@@ -361,6 +337,3 @@ def broken(name, changes):
         else:
             table[last] = value
     return tables
-
-
-VARIANTS = BY_HAND + of_wrong_type()

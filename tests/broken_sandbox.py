@@ -142,6 +142,32 @@ BY_HAND = [
     ("machine", {"surface[0].hinge": "pivot", "surface[0].mass": 0.0}, "surface[0].mass", "1e-"),
     ("machine", {"surface[0].hinge": "pivot", "surface[0].mass": 1.0, "surface[0].turn": 5.0},
      "surface[0].hinge", "turn, shake and travel"),
+    *(
+        ("alone", {"surface[0].hinge": "pivot", "surface[0].mass": 1.0, f"surface[0].{key}": value},
+         f"surface[0].{at}", said)
+        for key, value, at, said in (
+            ("spring", -1.0, "spring", "from 0"),
+            ("stops_deg", [5, 20], "stops_deg", "the 0 where it begins"),
+            ("stops_deg", [-5], "stops_deg", "two numbers"),
+            ("inertia", 1e-12, "inertia", "from 1e-"),
+            ("motor", {"torque": 1.0}, "motor.speed_deg", "is missing"),
+            ("motor", {"speed_deg": 1.0, "torque": 0.0}, "motor.torque", "> 0"),
+            ("motor", {"speed_deg": 1.0, "torque": 1.0, "power": 2}, "motor.power", "unknown"),
+        )
+    ),
+    # what moves
+    *(
+        ("alone", {f"surface[0].{key}": value}, f"surface[0].{at}", said)
+        for key, value, at, said in (
+            ("shake", {"by": [0.0, 0.1]}, "shake.frequency", "is missing"),
+            ("shake", {"by": [0.0, 0.1], "frequency": 0.0}, "shake.frequency", "from 1e-06"),
+            ("travel", {"to": [0.0, 0.0], "at": -1.0, "in": 1.0}, "travel.at", "from 0"),
+            ("travel", {"to": [0.0, 0.0], "in": 0.0}, "travel.in", "from 1e-09"),
+            ("travel", {"to": [0.0, 0.0], "in": 1.0, "for": 2}, "travel.for", "unknown"),
+            ("turn", 1e6, "turn", "to 36000"),
+            ("pivot", [0.0, 0.0], "pivot", "is for what moves: give turn, travel or hinge"),
+        )
+    ),
     # what waits for a touch
     ("alone", {"surface[0].opens_when": {"touched": "bell"}, "stream.interact": True},
      "surface[0].opens_when.touched", "flap, drum"),

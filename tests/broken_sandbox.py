@@ -94,7 +94,6 @@ BY_HAND = [
     # kinds of particles
     ("machine", {"gravity_deg": 10.0}, "gravity_deg", "0 with [incoming]"),
     ("alone", {"gravity_deg": 720.5}, "gravity_deg", "720"),
-    ("alone", {"gravity_deg": "left"}, "gravity_deg", "number"),
     ("alone", {"stream.omega": 3.0}, "stream.omega", "particle.spin true"),
     ("dominoes", {"stream[2].omega": 3.0}, "stream[2].omega", "particle[2].spin true"),
     ("alone", {"stream.angle_deg": 30.0}, "stream.angle_deg", 'particle.shape is "disk"'),
@@ -173,8 +172,6 @@ BY_HAND = [
      "surface[0].opens_when.touched", "flap, drum"),
     ("alone", {"surface[0].opens_when": {"touched": "drun"}, "stream.interact": True},
      "surface[0].opens_when.touched", "did you mean drum?"),
-    ("alone", {"surface[0].closes_when": {"touched": 3}, "stream.interact": True},
-     "surface[0].closes_when.touched", "a string"),
     ("alone", {"surface[0].closes_when": {}, "stream.interact": True},
      "surface[0].closes_when.touched", "is missing"),
     ("alone", {"surface[0].closes_when": "flap", "stream.interact": True},
@@ -194,7 +191,6 @@ BY_HAND = [
      "plate.starts_when", "turn, shake, travel or a motor"),
     # what is solid from one side
     ("machine", {"surface[0].passes": "sideways"}, "surface[0].passes", '"up", "down", "left"'),
-    ("machine", {"surface[0].passes": 1.0}, "surface[0].passes", '"up", "down", "left"'),
     ("machine", {"surface[0].passes": "in"}, "surface[0].passes", "of what is straight"),
     ("machine", {"surface[1].passes": "up"}, "surface[1].passes", '"in" or "out" of an arc'),
     ("machine", {"surface[2].passes": "right"}, "surface[2].passes", "must have y beyond that of"),
@@ -212,17 +208,13 @@ BY_HAND = [
      "give either"),
     ("machine", {"pair[0].meet": False, "pair[0].restitution": GONE}, "pair[0].meet",
      "two kinds of particles"),
-    ("machine", {"pair[1].meet": "no"}, "pair[1].meet", "true or false"),
     ("machine", {"pair[0].between": ["small"]}, "pair[0].between", "two names"),
     ("machine", {"pair[0].between": ["small", "big", "gate"]}, "pair[0].between", "two names"),
     ("machine", {"pair[0].between": GONE}, "pair[0].between", "is missing"),
-    ("machine", {"material": {"name": "ore"}}, "material", "[[material]]"),
-    ("machine", {"pair": {"between": ["small", "big"]}}, "pair", "[[pair]]"),
     # belts and plates
     ("machine", {"conveyor[0].to": [2.0, -2.0]}, "conveyor[0].to", "differ from conveyor[0].from"),
     ("machine", {"conveyor[0].to": GONE}, "conveyor[0].to", "is missing"),
     ("machine", {"conveyor[0].friction": "adhesion"}, "conveyor[0].friction", "a number"),
-    ("machine", {"conveyor": {"name": "a"}}, "conveyor", "[[conveyor]]"),
     ("machine", {"plate[1].pivot": GONE}, "plate[1].distance", "name and pivot = [x, y]"),
     ("alone", {"plate.pivot": GONE}, "plate.distance", "name and pivot = [x, y]"),
     ("machine", {"plate[1].distance": 0.6, "plate[1].pivot": GONE, "plate[1].name": GONE},
@@ -276,7 +268,6 @@ BY_HAND = [
     # engines that cannot
     ("machine", {"stream[1].interact": True, "run.engine": "exact"}, "run.engine",
      "stream[1].interact"),
-    ("machine", {"stream[0].interact": 1}, "stream[0].interact", "true or false"),
     ("dominoes", {"run.engine": "exact", "string": GONE, "rod": GONE, "spring": GONE, "pin": GONE},
      "run.engine", "needs contact or pymunk"),
     ("alone", {"string": [{"from": [0.0, 0.5]}], "run.engine": "exact"}, "run.engine",
@@ -319,7 +310,6 @@ BY_HAND = [
     ("dominoes", {"string[0].particle": 5}, "string[0].particle", "there are 5 particles"),
     ("dominoes", {"string[0].particle": -1}, "string[0].particle", ">= 0"),
     ("dominoes", {"string[0].from": GONE}, "string[0].from", "is missing"),
-    ("dominoes", {"string": {"from": [0.0, 0.5]}}, "string", "[[string]]"),
     ("alone", {"run.until": "landed"}, "run.until", "[outgoing]"),
     # what is expected
     ("machine", {"expect": [{"quantity": "carriage.impact.count", "value": 1.0, "tolerance": "1",

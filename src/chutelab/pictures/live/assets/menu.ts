@@ -49,7 +49,7 @@ class Menu {
     this.dark = [...document.styleSheets[0].cssRules].find((rule): rule is CSSMediaRule =>
       rule instanceof CSSMediaRule && rule.conditionText.includes("prefers-color-scheme"));
     const { theme } = kept;
-    // The page is as the system has it already: to say so again has all of it styled and painted once more.
+    // It is as the system has it: to say so again has all of it styled and painted once more.
     if (theme in THEMES && theme !== "system") this.paint(theme);
     else this.press("system");
   }

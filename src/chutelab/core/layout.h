@@ -202,7 +202,7 @@ typedef struct {
     int struck;             /* stop that it meets as the step ends: 1, 2, or 0 */
     int first, last;        /* [in] of the laws: its first and last state in their `swings` */
     int steered;            /* [in] it is turned by hand */
-    int pad;
+    int lies;               /* stop on which it lies when it is struck: 1, 2, or 0 */
 } Mover;
 
 /* The state of a hinge: halfway through the impulses of a step, and before a blow. */

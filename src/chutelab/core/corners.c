@@ -228,14 +228,16 @@ static void fill_in(const Shape *a, const Shape *b, Touch *t) {
 }
 
 /* The side of a segment that a corner is on: its own. Where the line from it to the centre, which is inside the shape,
-   crosses the segment, it has sunk through, and is on the side of the centre. */
-static int side_of(const Shape *a, const Surface *s, int corner) {
+   crosses the segment, it has sunk through, and is on the side of the centre; so it is `near` its ends, too: what has
+   sunk into two walls is beyond the end of each. */
+static int side_of(const Shape *a, const Surface *s, int corner, double near) {
     double x = a->p[corner][0] - s->x, y = a->p[corner][1] - s->y, u = a->x - s->x, v = a->y - s->y;
     double off = y * s->tx - x * s->ty, mid = v * s->tx - u * s->ty, both = fabs(off) + fabs(mid);
+    double over = fabs(off) <= near ? near : 0;
     int own = off >= 0 ? 1 : -1, centre = mid >= 0 ? 1 : -1;
     if (own == centre) return own;
     double cut = ((x * s->tx + y * s->ty) * fabs(mid) + (u * s->tx + v * s->ty) * fabs(off)) / both;
-    return cut >= 0 && cut <= s->length ? centre : own;
+    return cut >= -over && cut <= s->length + over ? centre : own;
 }
 
 /* Whether a corner is inside the circle of an arc: on its own, or by the centre where the line to it, inside the shape,
@@ -261,7 +263,7 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
         const double *q = a->p[t->which];
         if (b->s && b->s->shape == SEGMENT) {
             double along = (q[0] - b->s->x) * b->s->tx + (q[1] - b->s->y) * b->s->ty;
-            t->on = side_of(a, b->s, t->which);
+            t->on = side_of(a, b->s, t->which, near);
             fill_in(a, b, t);
             return along >= -near && along <= b->s->length + near;
         }
@@ -518,7 +520,7 @@ double meet_corners(int i, int j, double from, double until, double soft) {
     for (int c = 0; c < count; c++) {
         Touch now = {.which = c};
         /* The side that it is on does not change within a step. */
-        if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c);
+        if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c, near);
         gap[c] = gap_at(&a, &b, near, &now);
         closed |= gap[c] <= 0;
         /* What is closed comes back no faster than is left to the next step. */
@@ -935,16 +937,18 @@ RARELY void strike_corners(int i, int j, double t) {
     if (two) was_moved(j);
     double before[3] = {a->vx, a->vy, a->spin}, lost, normal = 0, slip = 0;
     if (answers) begin_answers();
-    for (int strings = 1; strings;) {
+    for (int again = 1; again;) {
         double wanted[MOST_TOUCHES];
         memcpy(wanted, back, sizeof back);
         feel(list, count, fastest);
         lost = share_out_blow(list, count, wanted, u);
-        strings = answers && let_go_again();
-        for (int n = 0; n < count && strings; n++) {
-            double none[3] = {-list[n].impulse[0], -list[n].impulse[1], 0};
-            push(list + n, none);
-            list[n].impulse[0] = list[n].impulse[1] = 0;
+        int lets_go = answers && let_go_again();
+        again = lets_go || hold_hinge(list, count, u, back);
+        for (int n = 0; n < count && again; n++) {
+            double *J = list[n].impulse, none[3] = {-J[0], -J[1], -J[2]};
+            if (lets_go) push(list + n, none);
+            else give_all(list + n, none);
+            J[0] = J[1] = J[2] = 0;
         }
     }
     for (int n = 0; n < count; n++) {
@@ -966,8 +970,8 @@ RARELY void strike_corners(int i, int j, double t) {
         if (j < 0 && c->impulse[0] > 0) hold(a, -1 - j);
         bear_contact(c, 1, t, t);
         if (c->impulse[0] > main->impulse[0]) main = c;
-        if (c->hung) leave_struck(c->hung - 1);
     }
+    if (main->hung) leave_struck(main->hung - 1);
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         double x = c->impulse[0] * c->nx + c->impulse[1] * c->ny, y = c->impulse[0] * c->ny - c->impulse[1] * c->nx;

@@ -342,6 +342,21 @@ def test_separation_is_told_by_its_angle(runs):
     assert f"leaves the drive pulley {past:.1f}° before the top" in sentence(recording, event)
 
 
+def test_what_slides_on_to_another_surface_does_not_begin_to_slip_there():
+    pair = {"restitution": 0.0, "friction": 0.0}
+    bowl = {"center": [0.0, 0.3], "radius": 0.3, "from_deg": 180, "to_deg": 270}
+    tables = {
+        "surface": [{"name": "bowl", **bowl, **pair},
+                    {"name": "floor", "from": [0.0, 0.0], "to": [0.6, 0.0], **pair}],
+        "stream": {"at": [-0.25, 0.27], "velocity": [0.0, 0.0]}, "run": {"until": 1.5},
+    }  # fmt: skip
+    recording = simulate(tables)
+    (slip,) = recording.select(Kind.SLIP)
+    assert sentence(recording, slip) == "slides on “floor”"
+    (slip,) = (ride := simulate(scene.load("slip"))).select(Kind.SLIP)
+    assert sentence(ride, slip) == "begins to slip on the incoming belt"
+
+
 def test_a_ramp_is_left_by_its_name():
     recording = simulate(
         scene.parse(
@@ -567,6 +582,48 @@ def test_a_gate_is_seen_while_it_is_there():
     assert seen_there == [
         [True, False], [True, False], [False, False], [False, True], [False, True],
     ]  # fmt: skip
+
+
+def test_names_go_along_with_what_leaves_its_place():
+    turning = """
+        [[surface]]
+        name = "{name}"
+        from = [{x}, -0.02]
+        to = [{x}, 0.02]
+        {moves}
+    """
+    turns = "pivot = [0.0, 0.0]\nturn = 90.0"
+    shakes = "shake = { by = [0.0, 0.002], frequency = 5.0 }"
+    text = """
+        [run]
+        until = 2.1
+        [particle]
+        radius = 0.01
+        [stream]
+        count = 1
+        at = [0.0, 0.3]
+        velocity = [0.0, 0.0]
+    """ + "".join(
+        turning.format(name=name, x=x, moves=moves)
+        for name, x, moves in (("one", -0.2, turns), ("two", 0.2, turns), ("near", 0.1, shakes))
+    )
+    recording = simulate(scene.parse(text))
+    layout = laid_out(recording)
+    wide = Window(-0.4, 0.4, -0.4, 0.4).fitted(layout.window.width / layout.window.height)
+    times = (0.0, 0.5, 1.0, 2.0)
+    stage = stage_of(recording, moments_at(times), layout=replace(layout, window=wide))
+    for index, t in enumerate(times):
+        drawn = moved(stage, index)
+        assert {gid for gid in drawn if "name" in gid} == {"name one", "name two"}
+        for name, side in (("one", -1.0), ("two", 1.0)):
+            turned = np.radians(90.0) * t
+            middle = stage.view.transData.transform(
+                (side * 0.2 * np.cos(turned), side * 0.2 * np.sin(turned))
+            )
+            box = drawn[f"name {name}"].get_window_extent()
+            away = np.maximum(np.maximum(box.min - middle, middle - box.max), 0.0)
+            # Half of its surface's length, and the gap beside it.
+            assert np.hypot(*away) < 0.02 / wide.width * stage.view.get_window_extent().width + 12.0
 
 
 def test_a_film_of_many_is_of_all_of_them_to_the_end():

@@ -8,7 +8,7 @@ those of the scene files. With `--text` no pictures are made, which takes most o
 
 from __future__ import annotations
 
-import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
 
 from chutelab.engines.simulation import simulate
@@ -69,15 +69,18 @@ def picture(name: str, path: Path) -> None:
     figure.write(path)
 
 
-def main(arguments: list[str]) -> None:
+def main() -> None:
     """Write the page and, unless asked for the text alone, the pictures."""
-    folders = [Path(a) for a in arguments if a != "--text"]
-    docs = folders[0] if folders else Path(__file__).parents[1] / "docs"
-    (docs / "gallery").mkdir(parents=True, exist_ok=True)
-    (docs / "gallery.md").write_text(text(), encoding="utf-8", newline="\n")
-    for one in about() if "--text" not in arguments else ():
-        picture(one.name, docs / "gallery" / f"{one.name}.png")
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    docs = Path(__file__).parents[1] / "docs"
+    parser.add_argument("directory", type=Path, nargs="?", default=docs)
+    parser.add_argument("--text", action="store_true", help="make gallery.md alone")
+    asked = parser.parse_args()
+    (asked.directory / "gallery").mkdir(parents=True, exist_ok=True)
+    (asked.directory / "gallery.md").write_text(text(), encoding="utf-8", newline="\n")
+    for one in () if asked.text else about():
+        picture(one.name, asked.directory / "gallery" / f"{one.name}.png")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

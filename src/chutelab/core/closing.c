@@ -183,7 +183,7 @@ void close_step(double h) {
     /* The share of the impulses that belongs to the step before; of a new contact, none. */
     W.before = W.length_before > 0 ? W.length_before / (W.length_before + h) : 0.5;
     if (!W.interact && !W.tracks[W.low].lasted) W.before = 0;
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         d->links = d->before = -1;
         /* A disk by itself that leaves what it lay on may come back to it in this step, off by what a
@@ -267,7 +267,7 @@ void close_step(double h) {
         }
     }
     give_back(W.contacts, W.contact_count);
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         Track *track = W.tracks + i;
         d->ends = -1;
@@ -340,9 +340,9 @@ void close_step(double h) {
         d->ends = reason;
     }
     /* All are asked for what they are ahead before the state of any changes. */
-    for (int i = W.low; i < W.high; i++)
+    for (EACH_LIVE(i))
         if (W.disks[i].mode == FREE && W.disks[i].ends >= 0) take_back(i);
-    for (int i = W.low; i < W.high; i++)
+    for (EACH_LIVE(i))
         if (W.disks[i].mode == FREE && W.disks[i].ends >= 0) end_in_contact(i, W.disks[i].ends);
 }
 

@@ -161,7 +161,10 @@ void pool(Contact *list, int count, int later) {
     double sums[2] = {0, 0};
     for (int n = 0; n < count; n++) {
         const double *loss = later ? list[n].later : list[n].entries;
-        for (int k = 1; k < 3; k++) sums[loss[k] < 0] += loss[k];
+        for (int k = 1; k < 3; k++) {
+            sums[0] += MAX(loss[k], 0);
+            sums[1] += MIN(loss[k], 0);
+        }
     }
     double all = sums[0] + sums[1];
     double shares[2] = {all > 0 ? all / sums[0] : 0, all < 0 ? all / sums[1] : 0};

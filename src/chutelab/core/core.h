@@ -174,6 +174,15 @@ static inline double driven(const Contact *c, double f) {
 /* Whether a particle has joints. */
 static inline int is_tied(int i) { return i >= 0 && W.disks[i].tie >= 0; }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
+/* Of a loop over all that are live as a step begins, or were released in it. */
+#define EACH_LIVE(i) int at_##i = 0, i; at_##i < W.live_count && (i = W.live[at_##i], 1); at_##i++
+/* Kinetic and potential energy of a disk with a velocity, a spin and a place, J. */
+static inline double kinetic_of(const Disk *d, const double *v, double spin) {
+    return 0.5 * (d->mass * (square(v[0]) + square(v[1])) + d->inertia * square(spin));
+}
+static inline double lifted(const Disk *d, const double *place) {
+    return d->mass * W.g * (W.up[0] * place[0] + W.up[1] * place[1]);
+}
 
 /* Change of normal velocity that a contact asks for under a normal impulse, m/s. */
 static inline double asks(const Contact *c, double impulse) {
@@ -251,6 +260,7 @@ double coupled(const Contact *c);
 double couple(const Contact *c, double wanted, double slip, double *tangent);
 void strike_hinge(int mover, double t);
 void leave_struck(int mover);
+int hold_hinge(Contact *list, int count, double (*u)[3], double *back);
 void stop_hinges(double t);
 void go_on(void);
 

@@ -72,7 +72,7 @@ static int query(int i, const double *box, Span s) {
     int n = 0, stamp = ++W.stamp;
     W.disks[i].mark = stamp;
     if (s.cells > MOST_CELLS) {
-        for (int j = W.low; j < W.high; j++)
+        for (EACH_LIVE(j))
             if (j != i && is_live(W.disks + j) && overlaps(W.disks + j, box)) W.found[n++] = j;
         return n;
     }
@@ -108,13 +108,10 @@ int list_near(double end) {
     double extent = 0;
     int live = 0;
     W.near_count = W.later_count = W.cell_count = W.wide_count = 0;
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         d->wide = 0;
         d->nears = -1;
-        d->left = d->bottom = INFINITY;
-        d->right = d->top = -INFINITY;
-        if (!is_live(d)) continue;
         box_of(d, end, W.interact ? SKIN : 0, &d->left);
         extent += MAX(d->right - d->left, d->top - d->bottom);
         live++;
@@ -124,9 +121,9 @@ int list_near(double end) {
     W.cell = live ? 1.5 * extent / live : 1;
     memset(W.heads, 0xff, (unsigned long)W.bucket_count * sizeof(int));
     /* What follows a prescribed path meets free disks only: it is entered first, and asks for no others. */
-    for (int i = W.low; i < W.high; i++)
-        if (is_live(W.disks + i) && W.disks[i].mode != FREE) enter(i, span_of(&W.disks[i].left));
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i))
+        if (W.disks[i].mode != FREE) enter(i, span_of(&W.disks[i].left));
+    for (EACH_LIVE(i)) {
         const Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
         Span span = span_of(&d->left);

@@ -198,8 +198,10 @@ void foresee_all(void) {
         int partner = ALARM;
         d->heap_place = -1;
         d->due = INFINITY;
-        if (d->mode == WAITING) d->due = MAX(d->release, W.now);
-        else if (d->mode == RIDING) d->due = d->ride_to;
+        if (d->mode == WAITING) {
+            d->due = MAX(d->release, W.now);
+            if (d->due < W.step_end) expect(i, d->due, ALARM);
+        } else if (d->mode == RIDING) d->due = d->ride_to;
         else if (d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs)))
             foresee_surfaces(i, &d->due, &partner);
         d->partner = partner;
@@ -209,9 +211,9 @@ void foresee_all(void) {
         if (W.disks[i].mode != FREE) { int k = i; i = j; j = k; }
         if (W.disks[i].mode == FREE) foresee_pair(i, j, &W.disks[i].due, &W.disks[i].partner);
     }
-    for (int i = W.low; i < W.high; i++)
+    for (EACH_LIVE(i))
         if (W.disks[i].due < W.step_end) expect(i, W.disks[i].due, W.disks[i].partner);
-    for (int i = W.low; i < W.high; i++)
+    for (EACH_LIVE(i))
         if (W.disks[i].far) foresee(i);
 }
 
@@ -315,6 +317,9 @@ static void support(int i, int k, double t) {
     c.drift = 0.5 * left * c.pull;
     if (c.turns > 0) normal = d->mass * (0.5 * left * weight / cosine - 2 * u[0]);
     if (normal <= 0) return;
+    c.impulse[0] = normal;
+    c.impulse[1] = c.impulse[2] = 0;
+    hold_hinge(&c, 1, &u, &(double){0});
     give(&c, normal);
     keep_impulse(&c, 1, t, t);
     /* Friction that need not slow it can hold it from now on. */
@@ -600,7 +605,12 @@ static void strike(int i, int j, double t) {
     if (rests) back = 0;
     double before[3] = {a->vx, a->vy, a->spin};
     if (jammed) jam(&c, t);
-    else give(&c, c.mass[0] * (back - u[0]));
+    else {
+        c.impulse[2] = 0;
+        if (c.hung) c.impulse[0] = couple(&c, back - u[0], u[1], c.impulse + 1);
+        hold_hinge(&c, 1, &u, &back);
+        give(&c, c.mass[0] * (back - u[0]));
+    }
     if (is_tied(i) || is_tied(j)) end_blow();
     a->since = t + later;
     if (c.two) b->since = t;

@@ -40,6 +40,8 @@ enum Status { DONE, PAUSED, FULL, STALLED, LACKING };
 typedef struct {
     double end;             /* where the next array begins; 0: at the beginning */
     int lacks;              /* whether there was too little */
+    int budget;             /* [in] rounds, or steps, after which a run comes back at the latest */
+    int packed;             /* [out] bytes of the events of a run that is over, see `pack_events`; 0 of others */
 } Room;
 
 /* What every step asks of every disk stands first, in few lines of the processor's cache. */
@@ -200,7 +202,7 @@ typedef struct {
     int struck;             /* stop that it meets as the step ends: 1, 2, or 0 */
     int first, last;        /* [in] of the laws: its first and last state in their `swings` */
     int steered;            /* [in] it is turned by hand */
-    int pad;
+    int lies;               /* stop on which it lies when it is struck: 1, 2, or 0 */
 } Mover;
 
 /* The state of a hinge: halfway through the impulses of a step, and before a blow. */
@@ -394,6 +396,7 @@ typedef struct {
     int *queue;          /* (disks + 1) */
     int *moved;          /* (disks) */
     int *found;          /* (2 disks) */
+    int *live;           /* (disks) those that ride, fly, lie or sleep in this step, ascending */
     int *nearby;         /* (disks, MAX_NEARBY) surfaces near each, ascending */
     int *everything;     /* (surfaces) 0, 1, ... */
     int *ends;           /* (2 surfaces) ends of segments and arcs, sorted by place ... */
@@ -443,12 +446,14 @@ typedef struct {
     int stalled;         /* which disk */
     double air_loss;     /* J; what air has taken */
     double released;     /* J; what disks had at their releases */
+    double ended[5];     /* J; what those of a crowd that ended had then: kinetic, potential, entries */
     double push_work;    /* J; what pushes by hand have given */
     double gained;       /* J; by which solves broke their law of energy, see `check_solve` */
     double unsolved;     /* radii; the most overlap that the solve of this step leaves beyond what it asks for */
     double unsolved_most; /* ... and of all steps so far */
     /* within the step */
     int low, high;       /* disks that this part of the run is about */
+    int live_count;
     int phase, cell_count, heap_count, moved_count, wide_count;
     int stirs;           /* whether something moves in this step */
     int passes;          /* some kinds pass through each other: their restitution is below 0 */
@@ -633,6 +638,7 @@ typedef struct {
     int most, window;       /* [in] rounds of a particle; progress check interval, in rounds */
     double tick;            /* [in] s over its pace; mean time between events below which it does not */
     double far;             /* [in] m; how far off the coordinates were rounded */
+    double loose;           /* [in] what ON_ARCS is more for this run */
     int laid, begun;        /* number after the member whose obstacles are laid; whether `lone` is */
     /* [out] */
     int knot_count, event_count, contacts, rounds; /* rounds: of the particle that took most */
@@ -826,6 +832,7 @@ typedef struct {
     double gained;          /* [in] J; by which solves broke their law of energy */
     double unsolved;        /* [in] radii; the most overlap that the solve of a step left beyond what it asked for */
     double largest;         /* [in] m; radius of the largest particle, with its corners */
+    double loose;           /* [in] what ON_ARCS is more for this run */
     /* [out] */
     int breach_count, hit_count;
     double speed;           /* m/s; the largest of anything that moves, belts included */

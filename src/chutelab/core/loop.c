@@ -1,5 +1,6 @@
 /* The run: releases and rides, steps, and how tracks end. */
 
+#include <string.h>
 #include "core.h"
 
 World W;
@@ -161,13 +162,18 @@ static void take_off(int i) {
     W.tracks[i].lasted = 0;
 }
 
-/* Kinetic and potential energy of a disk with a velocity, a spin and a place, J. */
-static double kinetic_of(const Disk *d, const double *v, double spin) {
-    return 0.5 * (d->mass * (square(v[0]) + square(v[1])) + d->inertia * square(spin));
+/* Have what is released be of those that are live. */
+static void list_one(int i) {
+    int n = W.live_count++;
+    for (; n > 0 && W.live[n - 1] > i; n--) W.live[n] = W.live[n - 1];
+    W.live[n] = i;
 }
 
-static double lifted(const Disk *d, const double *place) {
-    return d->mass * W.g * (W.up[0] * place[0] + W.up[1] * place[1]);
+/* List all that are live as a step begins. */
+static void list_live(void) {
+    W.live_count = 0;
+    for (int i = W.low; i < W.high; i++)
+        if (is_live(W.disks + i)) W.live[W.live_count++] = i;
 }
 
 /* Release a disk at t if its place is free; its event is then the end of a ride, or an impact. */
@@ -182,6 +188,7 @@ static int release(int i, double t) {
     d->on = -1;
     d->changes++;
     d->mode = RIDING;
+    list_one(i);
     if (d->ride_rho > 0) plan_ride(d, t);
     event_here(RELEASE, i, -1);
     knot_now(i);
@@ -375,9 +382,12 @@ static double bent_step(double h) {
 /* Note what all disks have together as a step begins. */
 static void note_totals(void) {
     Total all = {.t = W.t, .unsolved = W.unsolved, .released = W.released};
-    for (int i = W.low; i < W.high; i++) {
+    all.kinetic = W.ended[0];
+    all.potential = W.ended[1];
+    memcpy(all.entries, W.ended + 2, sizeof all.entries);
+    for (EACH_LIVE(i)) {
         const Disk *d = W.disks + i;
-        if (d->mode == WAITING) continue;
+        if (d->mode == GONE) continue;
         const Track *track = W.tracks + i;
         const double *place = &d->x, *v = &d->vx, none[3] = {0}, *ahead = none;
         double state[4], spin = d->spin;
@@ -394,7 +404,7 @@ static void note_totals(void) {
             place = state;
             v = place + 2;
             all.entries[0] -= d->mass * (W.gx * (place[0] - track->knot[1]) + W.gy * (place[1] - track->knot[2]));
-        } else if (d->mode == GONE && !track->begun) continue;
+        }
         all.kinetic += kinetic_of(d, v, spin);
         all.potential += lifted(d, place);
         for (int n = 0; n < 3; n++) all.entries[n] += d->entries[n] - ahead[n];
@@ -446,7 +456,7 @@ static int begin_step(void) {
     }
     do {
         W.again = span > 0 ? MIN((W.length + h) / span, MOST_AGAIN) : 1;
-        for (int i = W.low; i < W.high; i++) {
+        for (EACH_LIVE(i)) {
             Disk *d = W.disks + i;
             if (d->mode == ASLEEP) look_ahead(i);
             if (d->mode == RIDING) ride_on(d, W.t, W.step_end);
@@ -494,7 +504,7 @@ static int begin_step(void) {
     }
     W.unsolved_most = MAX(W.unsolved_most, W.unsolved);
     /* A fast belt may have thrown a disk further than its list of neighbours foresaw. */
-    for (int i = W.low; i < W.high; i++)
+    for (EACH_LIVE(i))
         W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);
     if (W.joint_count) tug_all(-1);
     close_step(h);
@@ -578,7 +588,7 @@ static int go_through(void) {
 }
 
 static void end_step(void) {
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         if (!is_live(d)) continue;
         /* What is tied ends with the step, as its joints' pull does. */
@@ -620,16 +630,19 @@ static void end_step(void) {
 static int is_over(int *reason) {
     int awake = 0;
     double next = INFINITY;
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         const Disk *d = W.disks + i;
         if (d->mode == RIDING || d->mode == FREE) awake = 1;
-        if (W.hinges && d->mode == WAITING && d->release < W.end_time) awake = 1;
         if (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs)) awake = 1;
+    }
+    if (awake && !W.hinges) return 0;
+    for (int i = W.low; i < W.high; i++) {
+        const Disk *d = W.disks + i;
+        if (W.hinges && d->mode == WAITING && d->release < W.end_time) awake = 1;
         if (d->mode == WAITING) next = MIN(next, MAX(d->release, W.t));
     }
     /* Hinges go on to a time that is given, else as long as disks do. */
     if (W.hinges) return !awake && W.until != UNTIL_TIME;
-    if (awake) return 0;
     if (W.interact && W.until == UNTIL_SETTLED && has_settled()) {
         *reason = BY_SETTLING;
         return 1;
@@ -653,7 +666,7 @@ static int begin_part(void) {
     W.low = W.high;
     if (W.low >= W.disk_count) return 0;
     W.high = W.interact ? W.disk_count : W.low + 1;
-    W.contact_count = W.earlier_count = 0;
+    W.contact_count = W.earlier_count = W.live_count = 0;
     W.t = W.disks[W.low].release;
     W.smallest = W.low;
     for (int i = W.low; i < W.high; i++) {
@@ -733,8 +746,9 @@ static int run_on(int steps) {
                 return FULL_KNOTS;
             }
         } else if (W.phase == STEP) {
+            list_live();
             int knots = (KNOTS_EACH + 2) * count + 64;
-            for (int i = W.low; i < W.high; i++)
+            for (EACH_LIVE(i))
                 if (W.disks[i].mode == RIDING) knots += ride_knots(W.disks + i);
             if (W.knot_count + knots > W.knot_room) return FULL_KNOTS;
             if (W.event_count + 4 * count + 64 > W.event_room) return FULL_EVENTS;

@@ -306,6 +306,7 @@ static int lay_out_work(void) {
     RESERVE(W.queue, n + 1);
     RESERVE(W.moved, n);
     RESERVE(W.found, 2.0 * n);
+    RESERVE(W.live, n);
     RESERVE(W.nearby, (double)MAX_NEARBY * n);
     RESERVE(W.everything, room);
     RESERVE(W.ends, 2.0 * room);

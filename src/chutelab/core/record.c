@@ -175,6 +175,11 @@ void track_flying(int i) {
 /* End a track at its last knot. */
 void finish(int i, int reason) {
     Disk *d = W.disks + i;
+    if (W.tracks[i].begun) {
+        W.ended[0] += kinetic_of(d, &d->vx, d->spin);
+        W.ended[1] += lifted(d, &d->x);
+        for (int n = 0; n < 3; n++) W.ended[2 + n] += d->entries[n];
+    }
     write_waiting(i);
     d->mode = GONE;
     d->reason = reason;

@@ -10,7 +10,7 @@
    of it: half of what gravity takes until then they get from what they lie on. */
 void wake(int i, double t) {
     int island = W.disks[i].island;
-    for (int n = W.low; n < W.high; n++) {
+    for (EACH_LIVE(n)) {
         Disk *d = W.disks + n;
         if (d->mode != ASLEEP || d->island != island) continue;
         double h = t - W.t, left = W.step_end - t;
@@ -56,28 +56,25 @@ static int joins(const Contact *c, double *u, int *owner) {
     return 1;
 }
 
-/* Let islands fall asleep that have been at rest for long enough, after a step's solve. */
+/* Let islands fall asleep that have been at rest for long enough, after a step's solve, which has left the islands
+   in `W.queue`. */
 void fall_asleep(void) {
-    int *parent = W.queue, ready = 0;
-    for (int i = W.low; i < W.high; i++) {
-        parent[i] = i;
-        ready += W.disks[i].mode == FREE && W.disks[i].rest >= CALM_DOWN / W.pace;
-    }
-    if (!ready || !W.sleeps) return;
-    for (int n = 0; n < W.contact_count; n++) {
-        const Contact *c = W.contacts + n;
-        if (c->two) parent[island_of(c->i)] = island_of(c->j);
-    }
+    int ready = 0;
+    for (EACH_LIVE(i)) ready |= W.disks[i].mode == FREE && W.disks[i].rest >= CALM_DOWN / W.pace;
+    if (!ready || !W.sleeps || !W.contact_count) return;
     /* Of each island, at its root: may it sleep, and how do its surfaces move? `found` counts the
        disks that may not, `ux`, `uy` are free to hold the velocity once the step is closed. */
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         W.found[i] = 0;
         W.moved[i] = -1;
     }
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         const Disk *d = W.disks + i;
         if (d->mode == FREE && d->rest < CALM_DOWN / W.pace) W.found[island_of(i)]++;
     }
+    ready = 0;
+    for (EACH_LIVE(i)) ready |= W.disks[i].mode == FREE && !W.found[island_of(i)];
+    if (!ready) return;
     for (int n = 0; n < W.contact_count; n++) {
         const Contact *c = W.contacts + n;
         int k = island_of(c->i);
@@ -90,11 +87,11 @@ void fall_asleep(void) {
         if (d->mode == FREE && !d->supports && d->rest >= CALM_DOWN / W.pace)
             W.found[island_of(W.near[n ^ 1])]++;
     }
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         int k = island_of(i);
         if (W.disks[i].mode == FREE && !W.found[k] && W.moved[k] >= 0) take_back(i);
     }
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         Track *track = W.tracks + i;
         int k = island_of(i);
@@ -117,7 +114,7 @@ void fall_asleep(void) {
         d->changes++;
         knot_now(i);
     }
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         int k = island_of(i);
         if (d->mode != FREE || W.found[k] || W.moved[k] < 0) continue;

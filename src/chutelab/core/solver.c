@@ -183,7 +183,7 @@ static void turn_slip(Contact *c) {
    within one they keep theirs. What the contacts of the step before were is not needed any more. */
 static void sort_by_islands(void) {
     int *parent = W.queue, *first = W.moved, *next = W.links;
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         parent[i] = i;
         first[i] = -1;
     }
@@ -222,7 +222,7 @@ static void sort_by_islands(void) {
 static void check_solve(int again) {
     static double last;
     double gained = 0, h = W.step_end - W.t;
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         const Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
         double x = d->vx - d->ux - d->kick[0], y = d->vy - d->uy - d->kick[1], w = d->spin - d->uspin;

@@ -269,7 +269,7 @@ int find_contacts(double h, int *woke) {
         if (cornered ? !add_places(i, j, bound, h, places, touches) : !add(i, j, least, bound, h, 0)) return 0;
     }
     if (*woke) return 1;
-    for (int i = W.low; i < W.high; i++) {
+    for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
         int first = W.contact_count;

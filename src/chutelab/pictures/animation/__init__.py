@@ -35,6 +35,7 @@ from chutelab.pictures.animation.actors import (
     crowd,
     drives,
     gates,
+    names,
     seen,
     strobe,
     strung,
@@ -57,6 +58,7 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.pictures.plots.style import Picture, figures, say, spoken
 from chutelab.results import Recording
+from chutelab.results.quantities import need_recording
 from chutelab.util.errors import MissingLibraryError
 from chutelab.util.files import whole
 
@@ -232,6 +234,7 @@ class Stage:
             handles.append(Line2D([], [], color=style.INK, lw=2.0, label=say("velocity")))
         _add_legend(view, handles, components=layout.arrow > 0.0)
         self.moving += bodies(view, recording, np.array([0]), times, "disk", style.STRIKE, 0.4)
+        self.moving += names(view, recording.machine, times)
         self.writings = self._add_text(layout, pace_words(slow), moments)
         if "energy" in shows:
             # Above the bars is room for their title, and the clock.
@@ -541,6 +544,7 @@ def animate(
     OSError
         If the file cannot be written.
     """
+    need_recording(recording)
     path = Path(path)
     kind = path.suffix.removeprefix(".").lower()
     if kind not in FORMATS:

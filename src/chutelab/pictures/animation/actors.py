@@ -16,9 +16,11 @@ from matplotlib.axes import Axes
 from matplotlib.font_manager import FontProperties, findfont
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
+from matplotlib.text import Annotation
 from PIL import ImageDraw, ImageFont
 
 from chutelab.machine import Arcs, Machine, Pieces
+from chutelab.machine.parts import Mover
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.machinery import (
     LEAST,
@@ -236,6 +238,52 @@ def gates(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
         return seen(drawn, piece.there(times))
 
     return [shown(piece) for piece in pieces(machine) if is_passing(machine, piece)]
+
+
+LEAVES = 2.0
+"""Heights of a name; what moves farther than this from its name takes the name along."""
+
+
+def names(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
+    """Return the names on `ax` that go along with their surfaces, upright, each on its side.
+
+    What turns or shakes on the spot leaves its name where it is.
+    """
+    found = {label.get_gid(): label for label in ax.texts if isinstance(label, Annotation)}
+    moving = []
+    for mover in machine.movers:
+        label = found.get(f"name {machine.surfaces[mover.surface]}")
+        if label is not None and _leaves(ax, machine, mover, label, times):
+            moving.append(_going(ax, mover, label, times))
+    return moving
+
+
+def _leaves(ax: Axes, machine: Machine, mover: Mover, label: Annotation, times: Floats) -> bool:
+    """Tell whether what moves is ever far from where its name stands."""
+    places = np.concatenate([[label.xy], mover.at_rest(label.xy, times)])[:, None]
+    own = [part.of(part.surface == mover.surface) for part in machine.parts]
+    gaps = np.concatenate([part.gap(places) for part in own], axis=1).min(axis=1)
+    return points_of(ax, float(gaps.max() - gaps[0])) > LEAVES * style.SMALL
+
+
+def _going(ax: Axes, mover: Mover, label: Annotation, times: Floats) -> Moving:
+    """Return a name that what moves carries, and that stays as far from it as it is written."""
+    points = 72.0 / ax.figure.dpi
+    box, tip = np.asarray(label.get_window_extent()), ax.transData.transform(label.xy)
+    half, (right, up) = 0.5 * points * np.ptp(box, axis=0), points * (box.mean(axis=0) - tip)
+    towards = np.arctan2(up, right) + np.append(0.0, mover.pose(times)[:, 2])
+    sides = np.stack([np.cos(towards), np.sin(towards)], axis=-1)
+    # From its middle to where the text ends on the side of the surface.
+    ends = (half / np.maximum(np.abs(sides), 1e-9)).min(axis=1)
+    beyond = np.hypot(right, up) - ends[0]
+    offsets = (ends + beyond)[1:, None] * sides[1:] if beyond > 0.0 else np.zeros((len(times), 2))
+    places = mover.carried(label.xy, times)
+    label.set(ha="center", va="center", animated=True)
+
+    def carry(index: int) -> None:
+        label.xy, label.xyann = places[index].tolist(), offsets[index].tolist()
+
+    return label, carry
 
 
 def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:

@@ -335,6 +335,7 @@ class _Names:
                 style.plain(self._said(surface, parts[0][0])), (0.0, 0.0),
                 xytext=(0.0, 0.0), textcoords="offset points", fontsize=style.SMALL,
                 color=color, path_effects=halo(), zorder=5.0,
+                gid=f"name {self.machine.surfaces[surface]}",
             )  # fmt: skip
             best: tuple[int, Spot, Bbox] | None = None
             for spot in self._spots(parts):
@@ -423,6 +424,7 @@ class _Names:
             for where, away in (
                 ((x, bottom), (0.0, -1.0)), ((x, top), (0.0, 1.0)),
                 ((right_, y), (1.0, 0.0)), ((left, y), (-1.0, 0.0)),
+                ((left, bottom), (-0.7, -0.7)), ((right_, bottom), (0.7, -0.7)),
             ):  # fmt: skip
                 yield _spot(np.array(where), farther * GAP, np.array(away))
 

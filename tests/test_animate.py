@@ -342,6 +342,21 @@ def test_separation_is_told_by_its_angle(runs):
     assert f"leaves the drive pulley {past:.1f}° before the top" in sentence(recording, event)
 
 
+def test_what_slides_on_to_another_surface_does_not_begin_to_slip_there():
+    pair = {"restitution": 0.0, "friction": 0.0}
+    bowl = {"center": [0.0, 0.3], "radius": 0.3, "from_deg": 180, "to_deg": 270}
+    tables = {
+        "surface": [{"name": "bowl", **bowl, **pair},
+                    {"name": "floor", "from": [0.0, 0.0], "to": [0.6, 0.0], **pair}],
+        "stream": {"at": [-0.25, 0.27], "velocity": [0.0, 0.0]}, "run": {"until": 1.5},
+    }  # fmt: skip
+    recording = simulate(tables)
+    (slip,) = recording.select(Kind.SLIP)
+    assert sentence(recording, slip) == "slides on “floor”"
+    (slip,) = (ride := simulate(scene.load("slip"))).select(Kind.SLIP)
+    assert sentence(ride, slip) == "begins to slip on the incoming belt"
+
+
 def test_a_ramp_is_left_by_its_name():
     recording = simulate(
         scene.parse(

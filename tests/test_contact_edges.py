@@ -11,6 +11,7 @@ from chutelab.results import Kind
 from chutelab.results.laws import judge
 from chutelab.results.recorder import StalledError
 from machines import bent, face, scene_of, thrown
+from shared import some
 
 G = 9.81
 R = 0.01
@@ -19,7 +20,7 @@ GRIP = {"friction": 1e6, "restitution": 0.0}
 FAR = face("far", (-50.0, -90.0), (50.0, -90.0))
 
 
-@pytest.mark.parametrize(("count", "alpha", "friction"), [(3, 0.2, 0.3), (4, 0.25, 1.0)])
+@pytest.mark.parametrize(("count", "alpha", "friction"), some([(3, 0.2, 0.3), (4, 0.25, 1.0)]))
 def test_a_nip_that_no_impulses_hold_open_lets_the_belt_slip(count, alpha, friction):
     """A belt drives disks that hardly roll into a wedge: none sinks into what does not give way.
 

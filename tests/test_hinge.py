@@ -312,7 +312,7 @@ def drawn(seed):
     return in_a_box(random, surfaces)
 
 
-@pytest.mark.parametrize("seed", seeds(12, 300))
+@pytest.mark.parametrize("seed", seeds(8, 300))
 def test_random_machines_keep_the_laws(seed):
     sound(chutelab.simulate(drawn(seed), engine="contact"))
 
@@ -329,6 +329,37 @@ def test_what_lies_at_its_stop_is_struck_and_stays_there(keys):
     recording = run(stream, to=[0.09, 0.0], hinge=[0.0, 0.0], **hung, **keys)
     assert recording.select("impact").size
     assert recording.swings["angle"].min() > -1e-6
+
+
+@pytest.mark.parametrize(
+    ("side", "shape", "gravity"),
+    [(1, "disk", 0.0), (1, "box", 0.0), (1, "disk", G), (1, "box", G), (-1, "disk", 0.0)],
+)
+def test_a_blow_on_to_a_stop_is_one_on_a_floor_and_one_off_it_turns_the_hinge(side, shape, gravity):
+    """Pressed on its stop it does not give way: v' = -e v, and m v² (1 - e²) / 2 is lost.
+
+    A light lever under a heavy particle: if it gave way at first, the stop would take that once the
+    step is over, and the contact seem to give what it takes. Off the stop the blow feels
+    1 / (1/m + l²/I). By its weight the lever hops on the stop, by less than 1e-5 rad; the stop
+    takes that when it is struck.
+    """
+    e, mass, lever, inertia, weight = 0.5, 1.0, 0.3, 1e-3, 0.01
+    body = {"radius": R} if shape == "disk" else {"shape": "box", "size": [2.0 * R, 2.0 * R]}
+    stream = {"at": [lever, side * 0.1], "velocity": [0.0, -2.0 * side]}
+    scene = machine(stream, gravity=gravity, run={"until": 0.08}, inertia=inertia, mass=weight,
+                    stops_deg=[0.0, 20.0], restitution=e)  # fmt: skip
+    scene["particle"] = {**body, "mass": mass}
+    recording = sound(chutelab.simulate(scene, engine="contact"))
+    (blow,) = recording.select("impact")
+    before, after = blow["velocity_before"][1], blow["velocity_after"][1]
+    feels = mass if side > 0 else 1.0 / (1.0 / mass + lever**2 / inertia)
+    near = 1e-11 if gravity else 1e-13
+    assert after == pytest.approx(before - (1.0 + e) * before * feels / mass, rel=near)
+    lost, hops = 0.5 * feels * before**2 * (1.0 - e**2), weight * gravity * 0.25 * 1e-3 / inertia
+    hop = 0.5 * inertia * hops**2
+    assert lost - near < recording.ledger.restitution_loss < lost + near + hop
+    turned = recording.pose("lever", [blow["t"] + 1e-3])[0, 2]
+    assert abs(turned) < 1e-6 if side > 0 else turned > 1e-3
 
 
 def test_a_pair_of_blow_and_friction_that_feel_each_other_gives_no_energy():
@@ -442,30 +473,6 @@ def test_the_damping_plate_may_hang():
     assert recording.prediction.reason.item().endswith("plate moves")
     with pytest.raises(SceneError, match=r"plate.hinge moves it: contact or pymunk has that"):
         chutelab.load("perpendicular", {**changes, "run.engine": "exact"})
-
-
-@pytest.mark.parametrize(
-    ("keys", "said"),
-    [
-        ({"mass": None}, "surface[0].mass is missing: kg, or inertia, kg m2"),
-        ({"hinge": None, "spring": 1.0}, "surface[0].mass = 1.0: is for what hangs on a hinge"),
-        ({"hinge": "end"}, 'surface[0].hinge = "end"'),
-        ({"turn": 3.0}, "surface[0].hinge = [0.0, 0.0]: is for what hangs free"),
-        ({"pivot": [0, 0]}, "surface[0].pivot = [0, 0]: give either this, with hinge"),
-        ({"spring": -1.0}, "surface[0].spring = -1.0"),
-        ({"damper": "a"}, 'surface[0].damper = "a"'),
-        ({"stops_deg": [5, 20]}, "surface[0].stops_deg = [5, 20]"),
-        ({"stops_deg": [-5]}, "surface[0].stops_deg"),
-        ({"motor": {"torque": 1.0}}, "surface[0].motor.speed_deg is missing"),
-        ({"motor": {"speed_deg": 1.0, "torque": 0.0}}, "surface[0].motor.torque = 0.0"),
-        ({"motor": {"speed_deg": 1.0, "torque": 1.0, "power": 2}}, "surface[0].motor.power"),
-        ({"inertia": 1e-12}, "surface[0].inertia = 1e-12"),
-    ],
-)
-def test_bad_input_is_told_with_key_value_and_what_is_allowed(keys, said):
-    with pytest.raises(SceneError) as told:
-        chutelab.load(machine(**{"mass": 1.0, **keys}))
-    assert said in str(told.value)
 
 
 @pytest.mark.parametrize(

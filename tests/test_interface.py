@@ -105,6 +105,14 @@ def test_a_recording_answers_by_itself():
             chutelab.measure(recording, slip)
     with pytest.raises(KeyError, match=r"did you mean landing\.x"):
         chutelab.measure(recording, "landng.x")
+    for ask in (
+        chutelab.compare,
+        chutelab.overlay,
+        lambda given: chutelab.measure(given, "landing.x"),
+        lambda given: chutelab.animate(given, "slip.gif"),
+    ):
+        with pytest.raises(TypeError, match=r"^'slip' is no recording; give what chutelab\.simul"):
+            ask("slip")
 
 
 class HaltError(Exception):

@@ -66,7 +66,7 @@ def lands_as_in_python(page, file, seed, count):
 @pytest.mark.parametrize(
     ("scenes", "each"),
     [
-        pytest.param(SCENES[1:3], 3, id="few"),
+        pytest.param(SCENES[1:3], 2, id="few"),
         pytest.param(SCENES, 40, id="200", marks=pytest.mark.slow),
     ],
 )
@@ -101,9 +101,9 @@ TURNS = """async () => {
 
 
 def test_a_stream_goes_on_under_the_hands_and_its_ledger_closes(shown):
-    page = shown("stream", ["stream.count=120"])
+    page = shown("stream", ["stream.count=60"])
     answers = page.evaluate(TURNS)
-    assert [there for _, there in answers][-1] == 120
+    assert [there for _, there in answers][-1] == 60
     for ledger, _ in answers:
         moved = ledger["belt_work"] + ledger["restitution_loss"] + ledger["friction_loss"]
         # Tracks may leave out 1e-4 m/s of what lasts in contact.

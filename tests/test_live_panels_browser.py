@@ -352,6 +352,7 @@ def test_a_flow_line_counts_a_throw_on_its_way_up_and_on_its_way_down(shown):
     assert page.evaluate(PASSAGES, [[x0 - 2.0, y0 + rise], [x0 - 1.0, y0 + rise]]) == []
 
 
+@pytest.mark.slow
 def test_a_flow_line_counts_a_crowd_as_python_finds_it_by_small_steps(shown):
     overrides = ["stream.count=40", "run.until='settled'"]
     page = shown("stream", overrides)

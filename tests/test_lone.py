@@ -195,7 +195,7 @@ def check(engine, seed):
     ("engine", "seed"),
     [
         pytest.param(engine, n, marks=() if n < few else pytest.mark.slow)
-        for engine, few in ((contact, 8), (pymunk, 1))
+        for engine, few in ((contact, 5), (pymunk, 1))
         for n in range(500)
     ],
 )

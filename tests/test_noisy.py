@@ -1,6 +1,7 @@
 """Searches among streams: the answer and its error, limits, targets with a minimum, stops."""
 
 import json
+import re
 import signal
 from math import sqrt
 from time import monotonic
@@ -13,9 +14,10 @@ import chutelab
 from chutelab import scene as sc
 from chutelab.cli import main
 from chutelab.pictures.plots.studies import scan
+from chutelab.studies import design
 from chutelab.studies.design import constrained, minimize, solve
 from chutelab.studies.design.evaluation import Span, measured
-from chutelab.studies.design.searches import Fit, Wishes, search
+from chutelab.studies.design.searches import Fit, Found, Wishes, search
 from shared import call
 from test_repeats import CROWD
 
@@ -129,6 +131,18 @@ def test_a_minimum_of_a_lone_particle_keeps_to_its_bound():
     limit = {"incoming.speed": (1.5, 4.0), "plate.restitution": (0.1, 0.9)}
     least = minimize("perpendicular", limit, "impact.t", subject_to={"impact.vx": (None, 2.5)})
     assert least.answer.values[0] == pytest.approx(2.5, rel=1e-6)
+
+
+@pytest.mark.parametrize(("error", "told"), [(4e-5, "35 "), (0.5, "35.00 ± 0.50 ")])
+def test_an_end_of_the_range_that_no_seed_doubts_has_no_error(error, told, monkeypatch):
+    ended = Found(np.array([35.0]), np.array([error]), np.array([[35.0]]), np.ones((1, 3, 1)), 0.0,
+                  [(1.0, 0.1)])  # fmt: skip
+    monkeypatch.setattr(design, "search", lambda *_: ended)
+    found = minimize(CROWD, {"plate.angle_deg": (10.0, 35.0)}, "arrival.vx.mean", repeat=3)
+    assert found.answer.values == (35.0,)
+    assert found.answer.errors == (error if error > 1e-3 else 0.0,)
+    assert found.answer.place == "end"
+    assert re.search(rf"^least +{told} +1\.00 ± 0\.10", str(found), re.MULTILINE)
 
 
 @pytest.mark.slow

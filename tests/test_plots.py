@@ -37,6 +37,7 @@ from handmade import (
     t_impact,
     t_landing,
 )
+from shared import some
 
 
 def axes(width=6.0, height=4.0):
@@ -178,6 +179,17 @@ def test_no_text_is_cut_off_overlapping_or_small(name):
     figure = plots.overlay(simulate(scene.load(name)))
     figure.canvas.draw()
     assert_legible(figure, 1.5)
+
+
+@pytest.mark.parametrize("name", some(["vibrating-feeder", "loop"]))
+def test_the_legend_of_the_velocities_lies_on_no_curve(name):
+    figure = plots.overlay(simulate(scene.load(name)))
+    figure.canvas.draw()
+    (ax,) = (one for one in figure.axes if any(line.get_gid() == "vx" for line in one.lines))
+    box = ax.get_legend().get_window_extent()
+    for line in ax.lines:
+        path = line.get_path().transformed(line.get_transform())
+        assert not path.intersects_bbox(box, filled=False), line.get_label()
 
 
 def test_overlay_holds_all_its_parts(tmp_path):

@@ -10,6 +10,7 @@ from chutelab.results.ledger import ledger
 from chutelab.results.recorder import EnoughError
 from chutelab.results.summary import stopped, summary, waits
 from machines import MOVING_CORNER
+from shared import some
 
 ARRAYS = ("knots", "offsets", "ended", "events", "by_surface")
 
@@ -108,7 +109,7 @@ def after(looks):
     return progress
 
 
-@pytest.mark.parametrize(("name", "engine", "changes", "looks"), STOPPABLE)
+@pytest.mark.parametrize(("name", "engine", "changes", "looks"), some(STOPPABLE, 2))
 def test_a_run_that_is_stopped_keeps_what_was_recorded(name, engine, changes, looks, tmp_path):
     scene_, whole = loaded(name, *changes), simulate(loaded(name, *changes), engine=engine)
     recording = simulate(scene_, engine=engine, progress=(watch := after(looks)))

@@ -27,7 +27,7 @@ from chutelab.studies.sweep import (
     TEXTS,
     TOUCHES,
 )
-from chutelab.studies.sweep.plan import row_of
+from chutelab.studies.sweep.plan import row_of, runs
 from chutelab.studies.sweep.plan import swept as swept_block
 from chutelab.util.errors import InputError
 from shared import call, some
@@ -118,7 +118,7 @@ perpendicular | stream.count=3 run.until=0.5 | stream.rate=1,10,100 plate.restit
 """A scene, what is set, what is varied."""
 
 
-@pytest.mark.parametrize("line", some(FAMILIES.strip().splitlines(), 2))
+@pytest.mark.parametrize("line", some(FAMILIES.strip().splitlines()))
 def test_rows_of_a_batch_are_those_of_single_runs(line):
     name, settings, varies = (part.split() for part in line.split("|"))
     block = block_of(load(*name, settings), varies)
@@ -149,6 +149,25 @@ def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
     monkeypatch.setattr("chutelab.studies.sweep.plan.alone", never)
     swept = sweep(load("perpendicular"), ["plate.angle_deg=-10:10:50", "incoming.speed=0.5,2,4"])
     assert np.isfinite(swept.columns["landing.x.mean"]).sum() > 100
+
+
+def test_tracks_of_a_batch_are_as_near_to_arcs_as_its_laws_see():
+    """Halfway between knots they are within 1e-6 of the radius, a lone one's within 1e-9."""
+    block = block_of(load("spoon", "stream.count=3"), ["incoming.speed=1.98,2.0"])
+    ((_, batch),) = runs(block)
+    (_, alone), _ = runs(block, apart=True)
+    off = []
+    for recording in (batch, alone):
+        t, owner = recording.knots["t"], recording.owner
+        halfway = 0.5 * (t[1:] + t[:-1])[(owner[1:] == 0) & (owner[:-1] == 0)]
+        x, y = recording.at(halfway)[0][:, 0].T
+        # On the inside of the arc: its radius, 0.5 m, less the particle's.
+        gap = np.abs(np.hypot(x - 1.05, y + 0.37) - (0.5 - recording.radius[0]))
+        off.append(gap[(x > 0.6) & (x < 1.0) & (gap < 1e-4)] / 0.5)
+    assert 1e-9 < off[0].max() < 1e-6
+    assert 1e-11 < off[1].max() < 1e-9
+    assert 4 * len(off[0]) < len(off[1])
+    assert batch.laws == ()
 
 
 @pytest.mark.slow

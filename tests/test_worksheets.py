@@ -81,7 +81,7 @@ QUICK = [
 ]
 
 
-@pytest.mark.parametrize(("number", "line"), some(QUICK))
+@pytest.mark.parametrize(("number", "line"), some(QUICK, 5))
 def test_commands_of_worksheets_run_as_they_stand(number, line, tmp_path, monkeypatch):
     shutil.copytree(find(number).folder, tmp_path / "lesson")
     monkeypatch.chdir(tmp_path / "lesson")

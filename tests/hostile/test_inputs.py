@@ -59,11 +59,14 @@ def results(kind, seed, count, folder):
 
 
 @pytest.mark.parametrize(
-    ("seed", "cases"), [(0, 10), pytest.param(1, ASKED, marks=pytest.mark.slow)]
-)
-@pytest.mark.parametrize("kind", KINDS)
-def test_what_is_wrong_is_refused_and_nothing_else_happens(kind, seed, cases, tmp_path):
-    count = round(cases * SHARES[kind])
+    ("kind", "seed", "count"),
+    [
+        ("all", 0, 10),
+        *(pytest.param(kind, 1, round(ASKED * SHARES[kind]), marks=pytest.mark.slow)
+          for kind in KINDS),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_refused_and_nothing_else_happens(kind, seed, count, tmp_path):
     found = results(kind, seed, count, tmp_path)
     assert len(found) == count
     wrong = [row for row in found if row["wrong"]]

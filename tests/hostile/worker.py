@@ -2,6 +2,7 @@
 
     python -m hostile.worker KIND SEED FIRST LAST
 
+KIND is one of `inputs.KINDS`, or "all" for cases of each in turn.
 It works in a folder that it makes in the current one. A case that hangs ends the process, with what
 it was doing on standard error; the line before it says which one it was.
 """
@@ -48,6 +49,8 @@ def fault(code, said, left):
 
 def outcome(kind, seed, number):
     """Run one case in a new folder, which becomes the current one; say what became of it."""
+    if kind == "all":
+        kind = list(inputs.KINDS)[number % len(inputs.KINDS)]
     words = inputs.KINDS[kind](random.Random(f"{kind} {seed} {number}"))
     began = perf_counter()
     faulthandler.dump_traceback_later(PATIENCE, exit=True)

@@ -188,9 +188,9 @@ class Module:
 
     def take_events(self, of: str = "World") -> NDArray[Any]:
         """Return all events as the bytes of rows of `results.EVENT`, and make room for others."""
-        struct = self.structs[of]
-        size: int = self.call("pack_events", struct.events, struct.event_count)
-        struct.event_count = 0
+        struct, room = self.structs[of], self.structs["Room"]
+        size: int = room.packed or self.call("pack_events", struct.events, struct.event_count)
+        struct.event_count = room.packed = 0
         return self._bytes[struct.events : struct.events + size].copy()
 
     def fill(self, of: str, **arrays: NDArray[Any]) -> None:
@@ -200,7 +200,9 @@ class Module:
 
     def run(self, name: str, steps: int, lacking: int) -> int:
         """Call a function for so many steps at most, as `work`; `lacking` tells of no memory."""
-        status: int = self.call(name, steps)
+        # A number that is handed over takes as long as the rest of a call.
+        self.structs["Room"].budget = steps
+        status: int = self.call(name)
         self._look()
         if status == ASIDE:
             raise AsideError

@@ -390,7 +390,7 @@ static double deep_in(const Barrier *b, double (*p)[2], int count, double x, dou
 
 /* Hits. */
 
-static double side_margin(void) { return MAX(L.rounding, ON_ARCS * L.largest); }
+static double side_margin(void) { return MAX(L.rounding, (ON_ARCS + L.loose) * L.largest); }
 
 static int is_there(const Barrier *b, double t) { return t >= b->appears && t < b->vanishes; }
 

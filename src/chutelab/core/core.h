@@ -260,6 +260,7 @@ double coupled(const Contact *c);
 double couple(const Contact *c, double wanted, double slip, double *tangent);
 void strike_hinge(int mover, double t);
 void leave_struck(int mover);
+int hold_hinge(Contact *list, int count, double (*u)[3], double *back);
 void stop_hinges(double t);
 void go_on(void);
 

@@ -910,16 +910,18 @@ RARELY void strike_corners(int i, int j, double t) {
     if (two) was_moved(j);
     double before[3] = {a->vx, a->vy, a->spin}, lost, normal = 0, slip = 0;
     if (answers) begin_answers();
-    for (int strings = 1; strings;) {
+    for (int again = 1; again;) {
         double wanted[MOST_TOUCHES];
         memcpy(wanted, back, sizeof back);
         feel(list, count, fastest);
         lost = share_out_blow(list, count, wanted, u);
-        strings = answers && let_go_again();
-        for (int n = 0; n < count && strings; n++) {
-            double none[3] = {-list[n].impulse[0], -list[n].impulse[1], 0};
-            push(list + n, none);
-            list[n].impulse[0] = list[n].impulse[1] = 0;
+        int lets_go = answers && let_go_again();
+        again = lets_go || hold_hinge(list, count, u, back);
+        for (int n = 0; n < count && again; n++) {
+            double *J = list[n].impulse, none[3] = {-J[0], -J[1], -J[2]};
+            if (lets_go) push(list + n, none);
+            else give_all(list + n, none);
+            J[0] = J[1] = J[2] = 0;
         }
     }
     for (int n = 0; n < count; n++) {
@@ -941,8 +943,8 @@ RARELY void strike_corners(int i, int j, double t) {
         if (j < 0 && c->impulse[0] > 0) hold(a, -1 - j);
         bear_contact(c, 1, t, t);
         if (c->impulse[0] > main->impulse[0]) main = c;
-        if (c->hung) leave_struck(c->hung - 1);
     }
+    if (main->hung) leave_struck(main->hung - 1);
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         double x = c->impulse[0] * c->nx + c->impulse[1] * c->ny, y = c->impulse[0] * c->ny - c->impulse[1] * c->nx;

@@ -700,7 +700,7 @@ static void carry_round(double start, double pace) {
         if (struck) end = found[1].angle;
         cut = (end - start) * rho / pace > left;
         if (cut) end = start + left * pace / rho;
-        double begin = A.age, above = rho * across, way = end - start, parts = ceil(way / STEP_ANGLE);
+        double begin = A.age, above = rho * across, way = end - start, parts = ceil(way / step_angle());
         for (int n = 1; n <= parts; n++) {
             double turn = way * (n / parts);
             put_round(rho, start + turn, pace, 0.0, 0.0);

@@ -181,6 +181,13 @@ int is_reached(int circle, double x, double y, int epoch);
 int first_contact(const Motion *m, double *until, int *obstacle, int *side);
 
 /* exact_ride.c */
+/* Share of the radius by which the cubic Hermite curve between two knots may leave a way round a circle: what
+   the recording is allowed, less what is missed by looking at three times of a step. */
+static inline double curve(void) { return 0.9 * (ON_ARCS + E.loose); }
+
+/* rad between knots at constant speed, where the cubic is off by the fourth power of it over 384. */
+static inline double step_angle(void) { return sqrt(sqrt(384.0 * curve())); }
+
 enum Outcome { NOTHING, LIFT, ONSET, GRIP, LOW, HIGH, HALT, ROLL };
 
 /* A particle that rides round a circle. */
@@ -196,7 +203,6 @@ typedef struct {
 typedef struct { double dt, phi, w, z, work, heat, twist; int outcome; } Ridden;
 
 #define MOST_KNOTS 32
-#define STEP_ANGLE 0.02424618605611948 /* rad between knots at constant speed: (384 CURVE)^(1/4) */
 
 int advance_ride(const Circle *c, double longest, Ridden *end, Ridden *knots);
 void find_bounds(int circle, int side, double phi, int epoch, Bound *found);

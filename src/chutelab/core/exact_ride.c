@@ -18,91 +18,101 @@
 #define ORDER 20
 /* Share of the angle (rad), of the speeds and of the load that the last terms of a step may be. */
 #define LEFT_OUT 1e-16
-/* Share of the radius by which the cubic Hermite curve between two knots may leave the way: 1e-9, less
-   what is missed by looking at three times of a step. */
-#define CURVE 0.9e-9
 /* Share of its first term that a series keeps at least where rounding makes it not negative. */
 #define SURELY 1e-9
-/* Bisections of a step for the time of an event, past the last bit. */
+/* Newton steps towards the time of an event, the share of it by which what they find may be off, and bisections of
+   what is left of a step, past the last bit. */
+#define STEPS 8
+#define NEAR (8.0 * ULP)
 #define HALVINGS 64
 
-typedef double Series[ORDER + 1];
+/* One term more than is used: that of the order after. */
+typedef double Series[ORDER + 2];
 /* Two numbers at once: each rounds as by itself. */
 typedef double Two __attribute__((vector_size(16)));
 
 static Series phi, w, z, work, heat, twist, normal, force, couple;
 
-/* Series that turn negative at an event, and what they tell. */
+/* Series that turn negative at events that can happen, and what they tell. */
 #define GAUGES 9
 static Series gauges[GAUGES];
-static const int TELLS[GAUGES] = { LIFT, ONSET, ONSET, GRIP, LOW, HIGH, HALT, ROLL, ROLL };
+static int tells[GAUGES], gauge_count;
 
 static double at_time(const double *c, double t) { return polynomial(c, ORDER + 1, t); }
 
-/* Whether a series stays at 0 or above up to a time, as the sum of what its terms can take off is less than the
-   first one. */
-static int is_never_negative(const double *c, double t) {
-    double power = 1.0, most = 0.0;
-    for (int n = 1; n <= ORDER; n++) power *= t, most += fabs(c[n]) * power;
+/* Whether a series stays at 0 or above up to a time, whose powers are given, as the sum of what its terms can take
+   off is less than the first one. */
+static int is_never_negative(const double *c, const double *powers) {
+    double most = 0.0;
+    for (int n = 1; n <= ORDER; n++) most += fabs(c[n]) * powers[n];
     return c[0] - most > SURELY * c[0] || (c[0] >= 0.0 && most == 0.0);
 }
 
 static int is_held(const Circle *c) { return c->rolling > 0.0 && c->roll == 0.0; }
 
 /* The Taylor coefficients in time; those of the work are of F, of the heat of -F u and that of the
-   couple, of the twist of q. */
+   couple, of the twist of q. Two products of series are taken at once: w w with F u, and phi' times the cosine
+   with phi' times the sine. */
 static void expand(const Circle *c) {
-    Series sine_of, cosine_of, slip, spin;
+    Series slip, spin, rate;
+    Two turns[ORDER + 2], forced[ORDER + 1], moved[ORDER + 1];
     int gripping = c->slip == 0.0, rolls = c->rolling > 0.0, held = is_held(c);
-    double lever = 1.0 / c->share - 1.0;
+    double lever = 1.0 / c->share - 1.0, up, across;
     double stick = !gripping ? 0.0 : held ? -1.0 : -c->share;
     double load = !gripping ? -c->slip * c->friction : rolls ? c->share * lever * c->roll * c->rolling : 0.0;
-    sin_cos(c->phi, sine_of, cosine_of);
+    sin_cos(c->phi, &up, &across);
+    turns[0] = (Two){ across, up };
     phi[0] = c->phi, w[0] = c->w, z[0] = c->z;
     work[0] = heat[0] = twist[0] = 0.0;
     slip[0] = gripping ? 0.0 : c->w + c->z - c->belt;
     spin[0] = held ? 0.0 : c->z - c->turn;
     for (int n = 0; n <= ORDER; n++) {
-        double sum = 0.0, up = 0.0, across = 0.0, rubbed = 0.0;
-        for (int i = 0; i <= n; i++) sum += w[i] * w[n - i];
-        normal[n] = c->gravity * cosine_of[n] - sum / c->rho;
-        force[n] = stick * c->gravity * sine_of[n] + load * normal[n];
+        Two products = { 0.0, 0.0 }, turning = { 0.0, 0.0 };
+        double next = n + 1;
+        phi[n + 1] = w[n] / c->rho / next;
+        rate[n] = next * phi[n + 1];
+        moved[n] = (Two){ w[n], slip[n] };
+        for (int i = 0; i < n; i++) products += forced[i] * moved[n - i], turning += rate[i] * turns[n - i];
+        turning += rate[n] * turns[0];
+        normal[n] = c->gravity * turns[n][0] - (products[0] + w[n] * w[0]) / c->rho;
+        force[n] = stick * c->gravity * turns[n][1] + load * normal[n];
         couple[n] = !rolls ? 0.0 : held ? -force[n] : -c->roll * c->rolling * normal[n];
-        if (n == ORDER) break;
-        w[n + 1] = (c->gravity * sine_of[n] + force[n]) / (n + 1);
-        z[n + 1] = lever * (force[n] + couple[n]) / (n + 1);
-        phi[n + 1] = w[n] / c->rho / (n + 1);
-        for (int i = 0; i <= n; i++) {
-            double rate = (i + 1) * phi[i + 1];
-            up += rate * cosine_of[n - i], across += rate * sine_of[n - i];
-            rubbed += force[i] * slip[n - i] + couple[i] * spin[n - i];
-        }
-        sine_of[n + 1] = up / (n + 1), cosine_of[n + 1] = -across / (n + 1);
-        work[n + 1] = force[n] / (n + 1);
-        heat[n + 1] = -rubbed / (n + 1);
-        twist[n + 1] = couple[n] / (n + 1);
+        forced[n] = (Two){ w[n], force[n] };
+        double rubbed = products[1] + force[n] * slip[0];
+        for (int i = 0; i <= n && rolls; i++) rubbed += couple[i] * spin[n - i];
+        w[n + 1] = (c->gravity * turns[n][1] + force[n]) / next;
+        z[n + 1] = lever * (force[n] + couple[n]) / next;
+        turns[n + 1] = (Two){ -turning[1], turning[0] } / next;
+        work[n + 1] = force[n] / next;
+        heat[n + 1] = -rubbed / next;
+        twist[n + 1] = couple[n] / next;
         slip[n + 1] = gripping ? 0.0 : w[n + 1] + z[n + 1];
         spin[n + 1] = z[n + 1];
     }
 }
 
-/* Find the series that turn negative at events; those of what cannot happen are 0, or 1. */
+/* Add a gauge: a number and two series, each times a factor. */
+static void add_gauge(int outcome, double first, double a, const double *x, double b, const double *y) {
+    double *gauge = gauges[gauge_count];
+    tells[gauge_count++] = outcome;
+    for (int n = 0; n <= ORDER; n++) gauge[n] = a * x[n] + b * y[n];
+    gauge[0] += first;
+}
+
+/* Find the series that turn negative at events that can happen. */
 static void find_gauges(const Circle *c) {
-    int held = is_held(c) && c->slip == 0.0, grips = c->slip == 0.0 && isfinite(c->friction);
-    for (int n = 0; n <= ORDER; n++) {
-        double first = n ? 0.0 : 1.0, grip = c->friction * normal[n], most = c->rolling * normal[n];
-        gauges[0][n] = normal[n];
-        gauges[1][n] = grips ? grip - force[n] : 0.0;
-        gauges[2][n] = grips ? grip + force[n] : 0.0;
-        gauges[3][n] = c->slip * (w[n] + z[n] - first * c->belt);
-        /* Round a circle that does not end it may go however often. */
-        gauges[4][n] = isfinite(c->low) ? phi[n] - first * c->low : first;
-        gauges[5][n] = isfinite(c->high) ? first * c->high - phi[n] : first;
-        gauges[6][n] = c->roll * (z[n] - first * c->turn);
-        /* What slips with less friction than that stays held. */
-        gauges[7][n] = held ? most - couple[n] : 0.0;
-        gauges[8][n] = held ? most + couple[n] : 0.0;
-    }
+    gauge_count = 0;
+    add_gauge(LIFT, 0.0, 1.0, normal, 0.0, normal);
+    for (int side = -1; side <= 1 && c->slip == 0.0 && isfinite(c->friction); side += 2)
+        add_gauge(ONSET, 0.0, c->friction, normal, side, force);
+    if (c->slip != 0.0) add_gauge(GRIP, -c->slip * c->belt, c->slip, w, c->slip, z);
+    /* Round a circle that does not end it may go however often. */
+    if (isfinite(c->low)) add_gauge(LOW, -c->low, 1.0, phi, 0.0, phi);
+    if (isfinite(c->high)) add_gauge(HIGH, c->high, -1.0, phi, 0.0, phi);
+    if (c->roll != 0.0) add_gauge(HALT, -c->roll * c->turn, c->roll, z, 0.0, z);
+    /* What slips with less friction than that stays held. */
+    for (int side = -1; side <= 1 && is_held(c) && c->slip == 0.0; side += 2)
+        add_gauge(ROLL, 0.0, c->rolling, normal, side, couple);
 }
 
 /* How long a step is, s, and by how many knots, evenly in time, it is recorded.
@@ -122,20 +132,39 @@ static double step_of(const Circle *c, double longest, int *parts) {
     double finite = isfinite(dt) ? dt : 0.0, rates[4][ORDER];
     for (int k = 0; k < 4; k++)
         for (int n = 1; n <= ORDER - k; n++) rates[k][n - 1] = (k ? rates[k - 1][n] : phi[n]) * n;
+    /* In the middle of the step and at its end at once. */
+    Two later[4], t = { 0.5 * finite, finite };
+    for (int k = 0; k < 4; k++) {
+        later[k] = (Two){ 0.0, 0.0 };
+        for (int n = ORDER - k; n--;) later[k] = later[k] * t + rates[k][n];
+    }
     for (int n = 0; n < 3; n++) {
-        double of[4], t = 0.5 * n * finite;
-        for (int k = 0; k < 4; k++) of[k] = polynomial(rates[k], ORDER - k, t);
+        double of[4];
+        for (int k = 0; k < 4; k++) of[k] = n ? later[k][n - 1] : rates[k][0];
         double one = of[0] * of[0];
         bend = MAX(bend, length_of(one * one - 3.0 * of[1] * of[1] - 4.0 * of[0] * of[2],
                                    of[3] - 6.0 * one * of[1]));
     }
-    double count = MAX(ceil(finite * sqrt(sqrt(bend / (384.0 * CURVE)))), 1.0);
+    double count = MAX(ceil(finite * sqrt(sqrt(bend / (384.0 * curve())))), 1.0);
     *parts = (int)MIN(count, MOST_KNOTS);
     return dt * MIN(MOST_KNOTS / count, 1.0);
 }
 
-/* When a series that is not negative at `low` and is at `high` becomes so. */
+/* When a series that is not negative at `low` and is at `high` becomes so. Newton's method tells about where: if it
+   does so there, little is left to be halved. */
 static double first_negative(const double *c, double low, double high) {
+    double t = 0.5 * (low + high);
+    for (int n = 0; n < STEPS && t > low && t < high; n++) {
+        double value = 0.0, slope = 0.0;
+        for (int k = ORDER; k >= 0; k--) slope = slope * t + value, value = value * t + c[k];
+        t -= value / slope;
+    }
+    double ends[] = { t - NEAR * t, t + NEAR * t };
+    for (int n = 0; n < 2; n++) {
+        if (!(ends[n] > low && ends[n] < high)) continue;
+        if (at_time(c, ends[n]) >= 0.0) low = ends[n];
+        else high = ends[n];
+    }
     for (int n = 0; n < HALVINGS; n++) {
         double middle = 0.5 * (low + high);
         if (middle == low || middle == high) break;
@@ -168,19 +197,22 @@ int advance_ride(const Circle *c, double longest, Ridden *end, Ridden *knots) {
     for (int n = 0; n <= ORDER; n++) back[n] = sign_of(c->w) * w[n];
     if (at_time(back, dt) < 0.0) {
         double turn = first_negative(back, 0.0, dt);
-        if (at_time(gauges[4], turn) < 0.0 || at_time(gauges[5], turn) < 0.0) dt = turn;
+        double there = at_time(phi, turn);
+        if (there < c->low || there > c->high) dt = turn;
     }
     double whole = dt, low = 0.0;
     int open[GAUGES], many = 0;
-    for (int k = 0; k < GAUGES; k++)
-        if (!is_never_negative(gauges[k], whole)) open[many++] = k;
+    Series powers = { 1.0 };
+    for (int n = 1; n <= ORDER; n++) powers[n] = powers[n - 1] * whole;
+    for (int k = 0; k < gauge_count; k++)
+        if (!is_never_negative(gauges[k], powers)) open[many++] = k;
     for (int n = 1; n <= parts && outcome == NOTHING; n++) {
         double high = whole * MIN(n / (double)parts, 1.0), first = INFINITY;
         for (int g = 0; g < many; g++) {
             int k = open[g];
             if (!(at_time(gauges[k], high) < 0.0)) continue;
             double at = first_negative(gauges[k], low, high);
-            if (at < first) first = dt = at, outcome = TELLS[k];
+            if (at < first) first = dt = at, outcome = tells[k];
         }
         low = high;
     }

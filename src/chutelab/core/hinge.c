@@ -26,6 +26,11 @@ static Mover *hinge_of(const Contact *c) { return W.movers + c->hung - 1; }
 
 static int is_hinge(const Mover *m) { return m->inertia > 0; }
 
+/* What impulses of a contact take of the angular momentum of its hinge, N m s. */
+static double moment_of(const Contact *c, const double *J) {
+    return J[0] * c->lever[0] + J[1] * c->lever[1] + J[2] * c->lever[2];
+}
+
 /* Moment of the weight at an angle of 0, and a quarter turn further, N m. */
 static void weigh(const Mover *m, double *now, double *ahead) {
     *now = m->moment[0] * W.gy - m->moment[1] * W.gx;
@@ -120,7 +125,7 @@ void prepare_hinge(Mover *m) {
     m->since = m->angle = m->rate = m->worked = m->stopped = m->damped = m->torque = m->pushed = 0;
     m->impulse[0] = m->impulse[1] = m->impulse[2] = 0;
     m->acted = -INFINITY;
-    m->stirs = m->solved = m->struck = 0;
+    m->stirs = m->solved = m->struck = m->lies = 0;
     lay_path(m);
     note(m, 0, 0);
 }
@@ -194,11 +199,17 @@ static void book_hinge(Mover *m, double f, double sign) {
     m->stopped -= sign * work(m, m->impulse[0] + m->impulse[1], f);
 }
 
-/* Have a hinge be where it is at t, when it is struck: the step ends there. */
+/* Have a hinge be where it is at t, when it is struck: the step ends there. On a stop that held it in this step it hops:
+   it lies there. */
 void strike_hinge(int mover, double t) {
     Mover *m = W.movers + mover;
     bring(m, t);
-    if (m->solved) note(m, t, m->rate);
+    if (m->solved) {
+        note(m, t, m->rate);
+        m->lies = m->impulse[0] != 0 ? 1 : m->impulse[1] != 0 ? 2 : 0;
+    }
+    if (!m->lies && m->angle <= m->stops[0] + AGAINST && m->rate <= 0) m->lies = 1;
+    if (!m->lies && m->angle >= m->stops[1] - AGAINST && m->rate >= 0) m->lies = 2;
     m->solved = 0;
     m->before = m->rate;
     W.step_end = MIN(W.step_end, t);
@@ -211,8 +222,10 @@ void stop_hinges(double t) {
         strike_hinge((int)(m - W.movers), t);
         m->drift = m->most = 0;
         for (int n = 0; n < 3; n++) m->impulse[n] = 0;
-        m->need[0] = m->angle <= m->stops[0] + AGAINST ? -m->rate : -INFINITY;
-        m->need[1] = m->angle >= m->stops[1] - AGAINST ? -m->rate : INFINITY;
+        for (int n = 0; n < 2; n++) {
+            int touches = n ? m->angle >= m->stops[1] - AGAINST : m->angle <= m->stops[0] + AGAINST;
+            m->need[n] = touches || m->lies == n + 1 ? -m->rate : n ? INFINITY : -INFINITY;
+        }
     }
 }
 
@@ -404,21 +417,18 @@ double swung_open(const Contact *c) {
 /* Give the hinge of a contact the opposite of its impulse. */
 void push_hinge(const Contact *c, const double *J) {
     Mover *m = hinge_of(c);
-    m->rate -= (J[0] * c->lever[0] + J[1] * c->lever[1] + J[2]) / m->inertia;
+    m->rate -= moment_of(c, J) / m->inertia;
 }
 
 /* Work of a contact's impulses behind the share f by what its hinge has changed its speed since, J. */
 double swung(const Contact *c, double f) {
     const Mover *m = hinge_of(c);
-    const double *J = c->impulse, along = J[0] * c->lever[0] + J[1] * c->lever[1] + J[2];
+    double along = moment_of(c, c->impulse);
     return work(m, along, f) - (1 - f) * along * c->turning;
 }
 
 /* Velocity of the hinge's point that is not counted in the law of energy of a solve. */
-double hinge_share(const Contact *c) {
-    const double *J = c->impulse;
-    return (J[0] * c->lever[0] + J[1] * c->lever[1] + J[2]) * c->turning;
-}
+double hinge_share(const Contact *c) { return moment_of(c, c->impulse) * c->turning; }
 
 /* What a hinge turns of a contact's normal impulse into slip, and of its tangential one into normal velocity, 1/kg. */
 double coupled(const Contact *c) { return c->lever[0] * c->lever[1] / hinge_of(c)->inertia; }
@@ -453,5 +463,48 @@ EXPORT void turn_hinge(int owner, double torque) {
     }
 }
 
-/* A path begins where a blow has changed the speed of a hinge. */
-void leave_struck(int mover) { lay_path(W.movers + mover); }
+/* Have the stop on which a hinge lies take its speed, which gives nothing back. */
+static void rest_on_stop(Mover *m) {
+    m->stopped += 0.5 * m->inertia * square(m->rate);
+    m->rate = 0;
+}
+
+/* A path begins where a blow has changed the speed of a hinge; the stop on which it lies takes what turns it on to that. */
+void leave_struck(int mover) {
+    Mover *m = W.movers + mover;
+    double off = m->lies == 2 ? -m->rate : m->rate;
+    if (m->lies && off < 0) rest_on_stop(m);
+    else if (off > 0) m->lies = 0;
+    lay_path(m);
+}
+
+/* A blow that presses a hinge on the stop on which it lies strikes what stands: return whether this one does, which has
+   these impulses at its places. Then the hinge rests, they feel nothing of it, and `u` and `back` are the velocities
+   before, and those after that are asked for; but not where that ends all approach, which was a hop then. */
+int hold_hinge(Contact *list, int count, double (*u)[3], double *back) {
+    Mover *m = list->hung ? hinge_of(list) : 0;
+    double moment = 0;
+    int comes = 0;
+    for (int n = 0; n < count && m && m->lies; n++) {
+        moment -= moment_of(list + n, list[n].impulse);
+        comes |= u[n][0] + list[n].lever[0] * m->before <= 0;
+    }
+    if (!comes || !(m->lies == 2 ? moment > 0 : moment < 0)) return 0;
+    for (int n = 0; n < count; n++) {
+        Contact *c = list + n;
+        const Disk *d = W.disks + c->i;
+        double was = u[n][0];
+        for (int k = 0; k < 3; k++) {
+            u[n][k] += c->lever[k] * m->before;
+            c->other[k] -= c->moved[k];
+            c->moved[k] = c->lever[k] = 0;
+        }
+        if (was < 0) back[n] *= MIN(u[n][0], 0) / was;
+        c->mass[0] = d->mass;
+        c->mass[1] = 1 / (d->inv_mass + square(d->radius) * d->inv_inertia);
+        c->mass[2] = d->inertia;
+    }
+    m->rate = m->before;
+    rest_on_stop(m);
+    return 1;
+}

@@ -318,6 +318,9 @@ static void support(int i, int k, double t) {
     c.drift = 0.5 * left * c.pull;
     if (c.turns > 0) normal = d->mass * (0.5 * left * weight / cosine - 2 * u[0]);
     if (normal <= 0) return;
+    c.impulse[0] = normal;
+    c.impulse[1] = c.impulse[2] = 0;
+    hold_hinge(&c, 1, &u, &(double){0});
     give(&c, normal);
     keep_impulse(&c, 1, t, t);
     /* Friction that need not slow it can hold it from now on. */
@@ -603,7 +606,12 @@ static void strike(int i, int j, double t) {
     if (rests) back = 0;
     double before[3] = {a->vx, a->vy, a->spin};
     if (jammed) jam(&c, t);
-    else give(&c, c.mass[0] * (back - u[0]));
+    else {
+        c.impulse[2] = 0;
+        if (c.hung) c.impulse[0] = couple(&c, back - u[0], u[1], c.impulse + 1);
+        hold_hinge(&c, 1, &u, &back);
+        give(&c, c.mass[0] * (back - u[0]));
+    }
     if (is_tied(i) || is_tied(j)) end_blow();
     a->since = t + later;
     if (c.two) b->since = t;

@@ -309,7 +309,7 @@ static void find_allowed(double bent) {
     if (*radius) All.reach = MAX(All.reach, *center + *radius + L.largest);
     L.length = MAX(All.reach, L.speed * All.t);
     L.rounding = ROUNDINGS * EPS * L.length;
-    L.arcs = ON_ARCS * (L.largest + *radius);
+    L.arcs = (ON_ARCS + L.loose) * (L.largest + *radius);
     L.bent = bent;
     L.late = lateness();
     int lone = L.engine == ENGINE_CONTACT && !L.interact;

@@ -40,6 +40,8 @@ enum Status { DONE, PAUSED, FULL, STALLED, LACKING };
 typedef struct {
     double end;             /* where the next array begins; 0: at the beginning */
     int lacks;              /* whether there was too little */
+    int budget;             /* [in] rounds, or steps, after which a run comes back at the latest */
+    int packed;             /* [out] bytes of the events of a run that is over, see `pack_events`; 0 of others */
 } Room;
 
 /* What every step asks of every disk stands first, in few lines of the processor's cache. */
@@ -200,7 +202,7 @@ typedef struct {
     int struck;             /* stop that it meets as the step ends: 1, 2, or 0 */
     int first, last;        /* [in] of the laws: its first and last state in their `swings` */
     int steered;            /* [in] it is turned by hand */
-    int pad;
+    int lies;               /* stop on which it lies when it is struck: 1, 2, or 0 */
 } Mover;
 
 /* The state of a hinge: halfway through the impulses of a step, and before a blow. */
@@ -636,6 +638,7 @@ typedef struct {
     int most, window;       /* [in] rounds of a particle; progress check interval, in rounds */
     double tick;            /* [in] s over its pace; mean time between events below which it does not */
     double far;             /* [in] m; how far off the coordinates were rounded */
+    double loose;           /* [in] what ON_ARCS is more for this run */
     int laid, begun;        /* number after the member whose obstacles are laid; whether `lone` is */
     /* [out] */
     int knot_count, event_count, contacts, rounds; /* rounds: of the particle that took most */
@@ -829,6 +832,7 @@ typedef struct {
     double gained;          /* [in] J; by which solves broke their law of energy */
     double unsolved;        /* [in] radii; the most overlap that the solve of a step left beyond what it asked for */
     double largest;         /* [in] m; radius of the largest particle, with its corners */
+    double loose;           /* [in] what ON_ARCS is more for this run */
     /* [out] */
     int breach_count, hit_count;
     double speed;           /* m/s; the largest of anything that moves, belts included */

@@ -13,6 +13,7 @@ int follow_all(int rounds);
 World *world(void);
 int prepare(void);
 int run(int steps);
+Room *room(void);
 
 /* Have the laws look at knots where they are. */
 static void take_knots(const Knot *knots, int count) {
@@ -60,6 +61,8 @@ EXPORT int pack_events(Event *events, int count) {
     return (int)(to - (char *)events);
 }
 
+static void end_events(Event *events, int count) { room()->packed = pack_events(events, count); }
+
 static int lay_out_pieces(void) {
     RESERVE(L.bodies, L.particle_count);
     RESERVE(L.barriers, (double)L.piece_count * members());
@@ -100,7 +103,7 @@ static int judge_exact(void) {
                 .piece_count = e->segment_count + e->arc_count + e->wheel_count,
                 .pulley = e->wheel_count, .books = e->books, .surface_count = e->surface_count,
                 .book_rows = e->surface_count * (e->apart ? e->lone_count : 1),
-                .contacts = e->contacts, .steps = e->rounds };
+                .contacts = e->contacts, .steps = e->rounds, .loose = e->loose };
     take_events(e->events, e->event_count);
     take_knots(e->knots, e->knot_count);
     if (!lay_out_pieces()) return 0;
@@ -114,9 +117,11 @@ static int judge_exact(void) {
 }
 
 /* As `follow_all`; a run that is over, and of which all is still there, is judged. */
-EXPORT int follow_and_judge(int rounds) {
-    int course = follow_all(rounds);
-    if (course == FINISHED && exact()->is_whole && !judge_exact()) return NO_MEMORY;
+EXPORT int follow_and_judge(void) {
+    int course = follow_all(room()->budget);
+    if (course != FINISHED) return course;
+    if (exact()->is_whole && !judge_exact()) return NO_MEMORY;
+    end_events(exact()->events, exact()->event_count);
     return course;
 }
 
@@ -162,9 +167,11 @@ static int judge_world(void) {
 }
 
 /* As `run`; a run that is over, of particles that do not meet, and of which all is still there, is judged. */
-EXPORT int run_and_judge(int steps) {
-    int status = run(steps);
+EXPORT int run_and_judge(void) {
+    int status = run(room()->budget);
     const World *w = world();
-    if (status == DONE && w->is_whole && !w->interact && !judge_world()) return LACKING;
+    if (status != DONE) return status;
+    if (w->is_whole && !w->interact && !judge_world()) return LACKING;
+    end_events(w->events, w->event_count);
     return status;
 }

@@ -18,11 +18,11 @@
 
 Exact *exact(void);
 int lay_out_exact(void);
-int follow_and_judge(int rounds);
+int follow_and_judge(void);
 World *world(void);
 int lay_out_world(void);
 int prepare_to_judge(void);
-int run_and_judge(int steps);
+int run_and_judge(void);
 Drawing *drawing(void);
 int build(void);
 int draw(void);
@@ -131,10 +131,10 @@ static int take_up_exact(void) {
 }
 
 /* Build what the plan says, and run it with the exact engine, see `follow_and_judge`; or ASIDE. */
-EXPORT int run_exact(int rounds) {
+EXPORT int run_exact(void) {
     int made = make_machine();
     if (made == ASIDE) return ASIDE;
-    return made && take_up_exact() ? follow_and_judge(rounds) : NO_MEMORY;
+    return made && take_up_exact() ? follow_and_judge() : NO_MEMORY;
 }
 
 static Surface *take_segments(Surface *to) {
@@ -199,8 +199,8 @@ static int take_up_world(void) {
 }
 
 /* The same with the contact engine, see `run_and_judge`. */
-EXPORT int run_world(int steps) {
+EXPORT int run_world(void) {
     int made = make_machine();
     if (made == ASIDE) return ASIDE;
-    return made && take_up_world() ? run_and_judge(steps) : LACKING;
+    return made && take_up_world() ? run_and_judge() : LACKING;
 }

@@ -303,14 +303,16 @@ class Job:
             order = np.argsort(swings["surface"], kind="stable")
             taken = module.array("swing_work", REAL, 3 * world.swing_count).reshape(-1, 3)
             recorder.swings, recorder.stopped = swings[order], taken[order, 0]
-        joints = module.array("joints", dtype("Joint"), world.joint_count)
-        springs = joints[joints["kind"] == JOINTS.index("spring")]
-        recorder.springs = np.column_stack([springs["kept"], springs["damped"], springs["given"]])
-        triggers = module.array("triggers", dtype("Trigger"), world.trigger_count)
-        recorder.triggered = triggers["t"].copy()
+        if world.joint_count:
+            joints = module.array("joints", dtype("Joint"), world.joint_count)
+            own = joints[joints["kind"] == JOINTS.index("spring")]
+            recorder.springs = np.column_stack([own["kept"], own["damped"], own["given"]])
+        if world.trigger_count:
+            triggers = module.array("triggers", dtype("Trigger"), world.trigger_count)
+            recorder.triggered = triggers["t"].copy()
         recorder.contacts = world.impact_count
         recorder.gained, recorder.air_loss = world.gained, world.air_loss
-        rows = module.array("totals", dtype("Total"), world.total_count)
-        recorder.take_totals(rows)
+        if world.total_count:
+            recorder.take_totals(module.array("totals", dtype("Total"), world.total_count))
         recorder.impulses = gather(module, self.owners)
         recorder.lasting = gather_lasting(module)

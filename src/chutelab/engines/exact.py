@@ -96,7 +96,7 @@ def ask(module: Module, machine: Machine, far: float, apart: bool) -> None:
     """Tell the core how to run, on coordinates that were rounded `far` off (m)."""
     exact: Any = module.structs["Exact"]
     exact.apart, exact.until = apart, UNTIL[machine.until]
-    exact.landing, exact.far = machine.landing, far
+    exact.landing, exact.far, exact.loose = machine.landing, far, machine.loose
     # The core judges in its own frame.
     exact.is_whole = far == 0.0 and machine.tilt == 0.0
     exact.most, exact.window, exact.tick = ROUNDS, WINDOW, TICK

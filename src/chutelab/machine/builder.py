@@ -128,7 +128,8 @@ def told(scene: Scene) -> Told:
     Sizes of the plan, and its row with its terms, see `Plan` in layout.h. A scene never changes:
     they are found once.
     """
-    if scene._told is None:
+    found: Told | None = scene._told
+    if found is None:
         names, kinds, meeting = scene.surfaces, range(len(scene.particles)), scene.meetings()
         masses, inertias = bodies(scene)
         rolling = [kind.rolling_friction for kind in scene.particles]
@@ -152,8 +153,7 @@ def told(scene: Scene) -> Told:
         sizes = {
             "members": 1, "width": len(line), "term_width": len(terms), "owners": len(names),
         }  # fmt: skip
-        scene._told = sizes | counts(scene), np.array([*line, *terms], dtype=REAL)
-    found: Told = scene._told
+        found = scene._told = sizes | counts(scene), np.array([*line, *terms], dtype=REAL)
     return found
 
 
@@ -329,11 +329,20 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
 
 def ahead(scene: Scene) -> Machine:
     """Return the machine of a scene, which is built when more of it is asked for than its keys."""
-    if scene.hinges or scene.triggers:
-        # Whether hinges can be is known once they are weighed.
-        return build(scene)
-    until, names, machine = scene.run.until, scene.surfaces, object.__new__(Machine)
-    vars(machine).update(
+    if (known := scene._ahead) is None:
+        if scene.hinges or scene.triggers:
+            # Whether hinges can be is known once they are weighed.
+            return build(scene)
+        known = scene._ahead = _keys(scene)
+    machine = object.__new__(Machine)
+    vars(machine).update(known)
+    return machine
+
+
+def _keys(scene: Scene) -> dict[str, Any]:
+    """Return what a machine has of the keys of its scene; with joints or movers not these."""
+    until, names = scene.run.until, scene.surfaces
+    return dict(
         build=build,
         scenes=scene,
         surfaces=names,
@@ -350,7 +359,6 @@ def ahead(scene: Scene) -> Machine:
         **({} if scene.movers else {"movers": ()}),
         triggers=(),
     )
-    return machine
 
 
 def _outlines(scene: Scene) -> tuple[Floats | None, ...]:

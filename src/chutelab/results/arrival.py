@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.machine import Arcs, Machine, Mover, Pieces, Segments
+from chutelab.machine import Arcs, Machine, Pieces, Segments
 from chutelab.results.record import EVENT, PARTICLES, Kind, Record, hermite, kept, turned
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -290,21 +290,15 @@ class Places:
         found = np.asarray(gap <= np.where(radius > 0.0, radius * (1.0 + TOUCH), self._point))
         for n in np.flatnonzero(found & self._cornered[particles]).tolist():
             edges = self.edges(int(particles[n]), places[n], float(times[n]))
-            found[n] = any(
-                self._between(edges, piece, mover, times[n]) <= TOUCH * radius[n]
-                for piece in self._pieces[owner]
-                if piece.there(times[n])
-            )
+            found[n] = False
+            for piece in (one for one in self._pieces[owner] if one.there(times[n])):
+                # Nearest to each other are a corner and the piece, or an edge and an end or centre.
+                to = np.stack([*piece.ends, *([piece.center] if isinstance(piece, Arcs) else [])])
+                to = to if mover is None else mover.carried(to, times[n])
+                near = np.concatenate([edges.start, *(edges.nearest(point) for point in to)])
+                near = near if mover is None else mover.at_rest(near, times[n])
+                found[n] |= piece.gap(near).min() <= TOUCH * radius[n]
         return found
-
-    @staticmethod
-    def _between(edges: Segments, piece: Pieces, mover: Mover | None, t: float) -> float:
-        """Return how far (m) the edges of a particle are from a piece of a surface at t, s."""
-        # Nearest to each other are a corner and the piece, or an edge and an end or a centre.
-        to = np.stack([*piece.ends, *([piece.center] if isinstance(piece, Arcs) else [])])
-        to = to if mover is None else mover.carried(to, t)
-        near = np.concatenate([edges.start, *(edges.nearest(point) for point in to)])
-        return float(piece.gap(near if mover is None else mover.at_rest(near, t)).min())
 
     def _meet(self, pair: Ints, places: Floats, t: float) -> bool:
         """Tell whether two that may touch do so, of which one has corners, by places (2, 2), m."""

@@ -273,7 +273,8 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("tilt", machine.tilt), ("dt", 0.0 if exact else machine.dt),
         ("mover_count", len(machine.movers)), ("swing_count", len(recording.swings)),
         ("gained", recording.gained), ("unsolved", recording.unsolved.max(initial=0.0)),
-        ("largest", np.max(machine.particle.radius)), ("outline_count", len(outlines)),
+        ("largest", np.max(machine.particle.radius)), ("loose", machine.loose),
+        ("outline_count", len(outlines)),
     ):  # fmt: skip
         setattr(laws, name, value)
     module.work("lay_out_laws")

@@ -224,8 +224,15 @@ def prediction(recording: Record) -> Transfer:
     return predict(recording.scene)
 
 
+def need_recording(given: object) -> None:
+    """Raise a `TypeError` if something is no recording, such as the name of a scene."""
+    if not isinstance(given, Record):
+        raise TypeError(f"{given!r} is no recording; give what chutelab.simulate(...) returns")
+
+
 def compare(recording: Record) -> Comparison:
     """Compare particle 0 with the theory's prediction for its scene."""
+    need_recording(recording)
     answer = prediction(recording)
     theory = {name: float(getattr(answer, name)) for name in THEORY}
     found = {name: float(values[0]) for name, values in symbols(recording).items()}
@@ -491,6 +498,7 @@ def measure(recording: Record, name: str) -> float:
     KeyError
         If the scene has no quantity of that name, or the name does not say of which particle.
     """
+    need_recording(recording)
     surfaces = recording.scene.places
     row = lookup(name, surfaces, recording.machine.streams)
     if row is None:

@@ -325,8 +325,7 @@ def conflicts(look: Look) -> Iterator[Fault]:
     kinds, streams = look.rows("particle", 1), look.rows("stream", 1)
     yield from _tables(look)
     yield from _names(look)
-    yield from _pairs(look)
-    yield from _waits(look)
+    yield from _references(look)
     for kind in kinds:
         yield from _mass(look, kind)
     yield from _engine(look, kinds, streams)
@@ -408,14 +407,23 @@ def _there_are(names: Sequence[str]) -> str:
     return f"there are {', '.join(names)}" if names else "none has a name"
 
 
-def _pairs(look: Look) -> Iterator[Fault]:
+def _references(look: Look) -> Iterator[Fault]:
+    """Say if what waits for a touch, or a pair, names something that is not there."""
     # Skip checks of references if names are invalid.
-    if not look.has("pair") or not all(map(look.sound, ("particle", *SURFACES))):
+    if not all(map(look.sound, SURFACES)):
         return
-    kinds = _texts(look.rows("particle"))
     free = dict.fromkeys(name for table in SURFACES for name in _texts(look.rows(table)))
-    anything = [*kinds, *free, *filter(look.has, ("incoming", "plate", "outgoing"))]
-    for pair in look.rows("pair"):
+    usual = [*filter(look.has, ("incoming", "plate", "outgoing"))]
+    there = [*usual, *free]
+    for row in (*look.rows("plate"), *look.rows("surface")):
+        for key in filter(row.given, WAITS):
+            name = row[key].get("touched") if isinstance(row[key], dict) else None
+            if isinstance(name, str) and name not in there:
+                allowed = f"no such surface; {did_you_mean(name, there, _there_are(there))}"
+                yield Fault(row.path(f"{key}.touched"), name, allowed)
+    kinds = _texts(look.rows("particle"))
+    anything = [*kinds, *free, *usual]
+    for pair in look.rows("pair") if look.sound("particle") else ():
         between = pair["between"]
         if not (isinstance(between, LIST) and pair.sound()):
             continue
@@ -429,20 +437,6 @@ def _pairs(look: Look) -> Iterator[Fault]:
                 allowed = did_you_mean(str(name), anything, _there_are(anything))
                 path = pair.path(f"between[{place}]")
                 yield Fault(path, name, f"no such kind or surface; {allowed}")
-
-
-def _waits(look: Look) -> Iterator[Fault]:
-    """Say if something waits until a surface is touched that is not there."""
-    if not all(map(look.sound, SURFACES)):
-        return
-    there = [*filter(look.has, ("incoming", "plate", "outgoing"))]
-    there += dict.fromkeys(name for table in SURFACES for name in _texts(look.rows(table)))
-    for row in (*look.rows("plate"), *look.rows("surface")):
-        for key in filter(row.given, WAITS):
-            name = row[key].get("touched") if isinstance(row[key], dict) else None
-            if isinstance(name, str) and name not in there:
-                allowed = f"no such surface; {did_you_mean(name, there, _there_are(there))}"
-                yield Fault(row.path(f"{key}.touched"), name, allowed)
 
 
 def _mass(look: Look, kind: Row) -> Iterator[Fault]:

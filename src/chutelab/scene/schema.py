@@ -139,6 +139,8 @@ class SceneTables(Table):
     _source: str = PrivateAttr("<scene>")
     _told: Any = PrivateAttr(None)
     """What the core is told of it, see `chutelab.machine.builder.told`."""
+    _ahead: Any = PrivateAttr(None)
+    """What its machine has before it is built, see `chutelab.machine.builder.ahead`."""
 
     @classmethod
     def validated(cls, document: Mapping[str, Any]) -> Self:

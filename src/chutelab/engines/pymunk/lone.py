@@ -157,7 +157,14 @@ class Lone:
         while not self.ended:
             self._look()
             if self.world.gates and not released:
-                self._gates()
+                every = self.world.faces
+                there = [face for face in every if face.appears <= self.t < face.vanishes]
+                # A gate that shut on the particle waits till it is clear.
+                inside = {face for face in there if face.gap(self.x)[0] < -self.world.hair}
+                self.shut = inside.difference(self.faces)
+                self.faces = [face for face in there if face not in self.shut]
+                ahead = (t for face in every for t in (face.appears, face.vanishes))
+                self.changes = min(t for t in (*ahead, inf) if t > self.t)
             touching, room = {}, inf
             for face in self.faces:
                 gap, normal = face.gap(self.x)
@@ -184,15 +191,6 @@ class Lone:
                 )  # fmt: skip
         self.world.space.remove(self.body, self.circle)
         self._look()
-
-    def _gates(self) -> None:
-        """See which surfaces are there; a gate that shut on the particle waits till it is clear."""
-        there = [face for face in self.world.faces if face.appears <= self.t < face.vanishes]
-        inside = {face for face in there if face.gap(self.x)[0] < -self.world.hair}
-        self.shut = inside.difference(self.faces)
-        self.faces = [face for face in there if face not in self.shut]
-        ahead = (t for face in self.world.faces for t in (face.appears, face.vanishes))
-        self.changes = min(t for t in (*ahead, inf) if t > self.t)
 
     def _look(self) -> None:
         """Report the progress; end the track here if that was enough."""

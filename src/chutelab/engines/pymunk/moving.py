@@ -82,27 +82,24 @@ class Hanging:
         inwards = -1.0 if self.body.angle > 0.5 * sum(np.clip(self.hinge.stops, -1e9, 1e9)) else 1.0
         stopped = inwards * self.stop.impulse
         if self.hinge.motor[1] > 0.0:
-            asked = self.hinge.inertia * (rate - self.before) - stopped - self._moment(h, mean)
+            # What weight, spring and contacts gave about the pivot, N m s.
+            sprung = self.hinge.spring * (self.hinge.rest - self.body.angle)
+            given = [h * (sprung - self.hinge.damper * mean)]
+
+            def touched(arbiter: pymunk.Arbiter) -> None:
+                for point in arbiter.contact_point_set.points:
+                    off, impulse = point.point_a - self.pivot, arbiter.total_impulse
+                    given.append(off.cross(impulse) / len(arbiter.contact_point_set.points))
+
+            for body in self.bodies:
+                arm, weight = body.local_to_world(body.center_of_gravity) - self.pivot, body.mass
+                given.append(arm.cross(weight * self.gravity * h))
+                body.each_arbiter(touched)
+            asked = self.hinge.inertia * (rate - self.before) - stopped - sum(given)
             self.work[0] += np.sign(asked) * self.motor.impulse * mean
         self.work[1] -= stopped * mean
         self.work[2] += self.hinge.damper * h * mean * mean
         self.states.append((t, self.body.angle + 0.5 * h * rate, rate, self.surface, 0))
-
-    def _moment(self, h: float, rate: float) -> float:
-        """Sum what weight, spring and contacts gave about the pivot in a step, N m s."""
-        sprung = self.hinge.spring * (self.hinge.rest - self.body.angle) - self.hinge.damper * rate
-        given = [h * sprung]
-
-        def touched(arbiter: pymunk.Arbiter) -> None:
-            for point in arbiter.contact_point_set.points:
-                off, impulse = point.point_a - self.pivot, arbiter.total_impulse
-                given.append(off.cross(impulse) / len(arbiter.contact_point_set.points))
-
-        for body in self.bodies:
-            weight = body.mass * self.gravity * h
-            given.append((body.local_to_world(body.center_of_gravity) - self.pivot).cross(weight))
-            body.each_arbiter(touched)
-        return sum(given)
 
 
 class Moving:

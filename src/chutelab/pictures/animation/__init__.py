@@ -58,6 +58,7 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.pictures.plots.style import Picture, figures, say, spoken
 from chutelab.results import Recording
+from chutelab.results.quantities import need_recording
 from chutelab.util.errors import MissingLibraryError
 from chutelab.util.files import whole
 
@@ -543,6 +544,7 @@ def animate(
     OSError
         If the file cannot be written.
     """
+    need_recording(recording)
     path = Path(path)
     kind = path.suffix.removeprefix(".").lower()
     if kind not in FORMATS:

@@ -56,9 +56,13 @@ def sentence(recording: Recording, event: Any) -> str:
     if kind == Kind.SEPARATION and called == "incoming":
         told = "pulley"
     # The event keeps the velocity of its `particle` only.
-    by = int(event["particle"])
+    by, events = int(event["particle"]), recording.events
+    before_it = events[(events["particle"] == 0) & (events["t"] < event["t"])]
     if kind == Kind.COLLISION and by:
         told = "hit"
+    if kind == Kind.SLIP and {*before_it["kind"][-1:]} & {Kind.IMPACT, Kind.LANDING, Kind.SLIP}:
+        # It slid already, on this surface or on one that goes over to it.
+        return say("slides", on=surface_words(called, "on"))
     before, after = (
         f"{figures(hypot(*event[key]))} m/s" for key in ("velocity_before", "velocity_after")
     )
@@ -83,8 +87,6 @@ def sentence(recording: Recording, event: Any) -> str:
     )
     if into > 0.0:
         text = say("event-restitution", said=text, value=figures(round(off / into, 3), "g"))
-    events = recording.events
-    before_it = events[(events["particle"] == 0) & (events["t"] < event["t"])]
     if kind == Kind.LANDING and list(before_it["kind"][-1:]) == [Kind.SEPARATION]:
         flown = event["t"] - before_it["t"][-1]
         text = say("event-flight", said=text, time=figures(flown, ".3f"))

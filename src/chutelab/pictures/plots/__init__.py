@@ -68,6 +68,7 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.pictures.plots.style import Picture, figures, look, say, stream_handles
 from chutelab.results import Recording
+from chutelab.results.quantities import need_recording
 from chutelab.results.quantities import prediction as predicted
 from chutelab.theory import Transfer
 from chutelab.theory.figures import PaperFigure
@@ -123,6 +124,7 @@ def overlay(
     ValueError
         If both `path` and `ax` are given.
     """
+    need_recording(recording)
     if prediction is None:
         prediction = predicted(recording)
     parts, start = analytic_of(recording, prediction)

@@ -252,7 +252,13 @@ def draw_velocity(
         (line,) = ax.plot(times, velocity[:, axis], color=style.VELOCITY[name], lw=1.6, gid=name)
         line.set_label(f"$v_{name[1]}$, {say(label)}")
     ax.set_xlim(times[0], _beyond(times))
-    ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85)
+    box = ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85).get_window_extent()
+    paths = (line.get_path().transformed(line.get_transform()) for line in ax.lines)
+    if any(path.intersects_bbox(box, filled=False) for path in paths):
+        # No place is free: it gets a strip of its own.
+        low, high = ax.get_ylim()
+        ax.set_ylim(low, high + 0.2 * (high - low))
+        ax.legend(fontsize=style.SMALL, loc="upper center", ncols=2, framealpha=0.85)
     return ax
 
 

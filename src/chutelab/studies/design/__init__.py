@@ -206,6 +206,9 @@ def maximize(scene: AnyScene, vary: Varied, quantity: str, **how: Unpack[How]) -
     return _Search(load(scene), vary, (), quantity, "maximize", how).answered()
 
 
+SHARP: Final = 1e-4
+"""Share of a range below which the error of an answer at its end is that of the search alone."""
+
 ELSEWHERE: Final = 0.5
 """Share of likely answers that are elsewhere from which on that is told."""
 
@@ -390,19 +393,22 @@ class _Search:
                 *(found.quantities[n] for n in self.shown),
             )
         ]
+        at_end = False
+        for n, one in enumerate(self.ranges):
+            value, error = numbers[n]
+            end = one.low if value - one.low < one.high - value else one.high
+            at_end |= abs(value - end) <= error
+            if abs(value - end) <= error < SHARP * one.width:
+                # Where no seed has it elsewhere, the end is no estimate and has no error.
+                numbers[n] = end, 0.0
+            else:
+                numbers[n] = min(max(value, one.low), one.high), error
         values, errors = zip(*numbers, strict=True)
         keys = len(self.ranges)
-        ends = [
-            min(value - one.low, one.high - value) <= error
-            for value, error, one in zip(values, errors, self.ranges, strict=False)
-        ]
-        inside = [
-            min(max(v, one.low), one.high) for v, one in zip(values, self.ranges, strict=False)
-        ]
         _, wanted = self.told(np.array([mean for mean, _ in found.quantities]))
         return Answer(
-            tuple(inside), values[keys:], wanted, "",
-            "end" if self.goal != "solve" and any(ends) else "inside",
+            values[:keys], values[keys:], wanted, "",
+            "end" if self.goal != "solve" and at_end else "inside",
             errors=errors[:keys], found_errors=errors[keys:],
         )  # fmt: skip
 

@@ -200,8 +200,14 @@ class Solution(Shown):
             found = map(answer.told, self.quantities, answer.found)
             numbers: Iterator[str] = (f"{value:.{DIGITS}g}" for value in (*answer.values, *found))
             if answer.errors:
-                errors = (*answer.errors, *answer.found_errors)
-                numbers = map(plus_minus, (*answer.values, *answer.found), errors)
+                values, errors = (
+                    (*answer.values, *answer.found),
+                    answer.errors + answer.found_errors,
+                )
+                numbers = (
+                    plus_minus(value, error) if error else f"{value:.{DIGITS}g}"
+                    for value, error in zip(values, errors, strict=True)
+                )  # fmt: skip
             rows.append((head, *numbers, answer.course))
         columns = ("", *keys, *names, "touches")
         return Sheet(self.asked, columns, tuple(rows), notes=tuple(remarks(self)))

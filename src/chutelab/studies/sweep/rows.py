@@ -21,7 +21,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine import build
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.arrival import arrivals, fates
 from chutelab.results.quantities import measured
@@ -178,15 +177,14 @@ def member(recording: Recording, row: int) -> Recording:
     offsets = recording.offsets[first : last + 1]
     events = recording.events[recording.events["particle"] // family.each == row]
     events["particle"] -= first
-    values = {key: numbers[first].item() for key, numbers in family.columns.items()}
     return replace(
         recording,
-        machine=build(family.scene.with_values(values)),
+        machine=recording.machine.member(row),
         knots=recording.knots[offsets[0] : offsets[-1]],
         offsets=offsets - offsets[0],
         ended=recording.ended[first:last],
         events=events,
-        by_surface=recording.by_surface[first:last].sum(axis=0),
+        by_surface=recording.by_surface[first:last],
     )
 
 

@@ -48,7 +48,10 @@ class Menu {
     document.querySelector("header .name")?.prepend(root);
     this.dark = [...document.styleSheets[0].cssRules].find((rule): rule is CSSMediaRule =>
       rule instanceof CSSMediaRule && rule.conditionText.includes("prefers-color-scheme"));
-    this.paint(kept.theme in THEMES ? kept.theme : "system");
+    const { theme } = kept;
+    // It is as the system has it: to say so again has all of it styled and painted once more.
+    if (theme in THEMES && theme !== "system") this.paint(theme);
+    else this.press("system");
   }
 
   button(id: string, drawing: string, act: () => void) {
@@ -66,11 +69,16 @@ class Menu {
   paint(theme: string) {
     if (this.dark) this.dark.media.mediaText = THEMES[theme];
     document.documentElement.style.colorScheme = theme === "system" ? "" : theme;
+    this.press(theme);
+    if (theme !== kept.theme) kept.theme = theme;
+    this.stage.recolour();
+  }
+
+  /** Show which theme is on. */
+  press(theme: string) {
     for (const name of Object.keys(THEMES)) {
       document.getElementById(`theme-${name}`)?.setAttribute("aria-pressed", String(name === theme));
     }
-    if (theme !== kept.theme) kept.theme = theme;
-    this.stage.recolour();
   }
 }
 

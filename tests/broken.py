@@ -19,11 +19,8 @@ def expect(**keys):
 BROKEN = {
     # wrong types
     "date for number": (IN + "[particle]\nradius = 2020-01-01", ["particle.radius"], "a number"),
-    "boolean for count": (IN + "[stream]\ncount = true", ["stream.count"], "a whole number"),
-    "number for title": ("title = 3\n" + IN, ["title"], "a string"),
     "number for table": ("plate = 3\n" + IN, ["plate"], "a table"),
     "list for table": ("run = []\n" + IN, ["run"], "a table"),
-    "table for surfaces": (IN + '[surface]\nname = "a"', ["surface"], "[[surface]]"),
     "number for point": (FREE.replace("[0, 1]", "1"), ["stream.at"], "[x, y]"),
     # out of range
     "absurd count": (IN + f"[stream]\ncount = {BIG}", ["stream.count"], "to 10000000"),

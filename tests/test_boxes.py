@@ -499,3 +499,24 @@ def test_a_corner_that_comes_slowly_stays_on_its_side(surface, long, begin, spin
     }
     recording = chutelab.simulate(tables)
     assert not recording.laws
+
+
+@pytest.mark.parametrize(("tilt", "mu"), [(44.0, 0.5), (45.0, 0.0), (50.0, 0.0)])
+def test_a_tip_that_comes_to_where_two_walls_meet_is_above_the_floor(tilt, mu):
+    """Sunk a little into both it is beyond the end of each; then it tips over and lies flat.
+
+    Its centre is as high as an edge is from it: (1/300, 0) m from the line through (-0.03, 0) and
+    (0.02, 0.012).
+    """
+    tables = {
+        "particle": {"shape": "polygon", "points": [[-0.03, 0], [0.02, 0.012], [0.02, -0.012]],
+                     "mass": 0.1, "spin": True},
+        "surface": [{"name": "walls", "points": [[0.0, 0.5], [0.0, 0.0], [0.5, 0.0]],
+                     "restitution": 0.0, "friction": mu}],
+        "stream": {"at": [0.06, 0.06], "velocity": [-0.5, -0.2], "angle_deg": tilt},
+        "run": {"until": 0.6},
+    }  # fmt: skip
+    recording = chutelab.simulate(tables, engine="contact")
+    assert not recording.laws
+    height = 0.012 * (0.03 + 0.01 / 3.0) / hypot(0.05, 0.012)
+    assert recording.ends()[1]["position"][0, 1] == pytest.approx(height, abs=3e-7)

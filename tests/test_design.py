@@ -22,7 +22,7 @@ from chutelab.studies.design import roots
 from chutelab.studies.design.evaluation import Evaluator, Outcomes, measured, target
 from chutelab.studies.design.uncertainty import as_dict, indices, sampled, spreads
 from chutelab.util.errors import InputError
-from shared import call
+from shared import call, some
 
 G, V, R, D, DROP, M = 9.81, 2.0, 0.1, 0.5, 0.5, 0.008
 
@@ -104,7 +104,7 @@ def ten():
 TEN = list(ten())
 
 
-@pytest.mark.parametrize(("given", "vary", "expected"), TEN)
+@pytest.mark.parametrize(("given", "vary", "expected"), some(TEN, 2))
 def test_landing_with_the_belts_speed_agrees_with_the_closed_form(given, vary, expected):
     found = design.solve(given, vary, "landing.vx=outgoing.speed", points=41)
     assert len(found.answers) == 1

@@ -25,7 +25,7 @@ SCENES = [
     ("slip", "particle.shape=sphere", "particle.spin=true"),
     *(("stream", "stream.count=20", f"stream.seed={seed}") for seed in (2**32, 2**53 - 1)),
 ]  # fmt: skip
-BALL = {"stream": {"at": [0.0, 0.3], "velocity": [0.1, 0.0]}, "run": {"until": 0.8}}
+BALL = {"stream": {"at": [0.0, 0.3], "velocity": [0.1, 0.0]}, "run": {"until": 0.5}}
 LINE = {"name": "line", "from": [-0.2, 0.0], "to": [0.3, 0.0], "restitution": 0.6}
 HANGS = {"hinge": "pivot", "mass": 0.1, "friction": 0.5}
 MOVING = [

@@ -425,30 +425,6 @@ def test_what_has_no_closed_form_is_refused_by_name():
         chutelab.simulate(scene).pose("tabel", [0.0])
 
 
-@pytest.mark.parametrize(
-    ("keys", "said"),
-    [
-        ({"shake": {"by": [0, 0.1]}}, "surface[0].shake.frequency is missing"),
-        ({"shake": {"by": [0, 0.1], "frequency": 0.0}}, "surface[0].shake.frequency = 0.0"),
-        ({"shake": {"by": 3, "frequency": 5.0}}, "surface[0].shake.by = 3"),
-        ({"shake": 3}, "surface[0].shake = 3"),
-        ({"travel": {"to": [0, 0], "at": -1.0, "in": 1.0}}, "surface[0].travel.at = -1.0"),
-        ({"travel": {"to": [0, 0], "in": 0.0}}, "surface[0].travel.in = 0.0"),
-        ({"travel": {"to": [0, 0], "in": 1.0, "for": 2}}, "surface[0].travel.for"),
-        ({"turn": "fast"}, 'surface[0].turn = "fast"'),
-        ({"turn": 1e6}, "surface[0].turn = 1000000.0"),
-        (
-            {"pivot": [0, 0]},
-            "surface[0].pivot = [0, 0]: is for what moves: give turn, travel or hinge",
-        ),
-    ],
-)
-def test_bad_input_is_told_with_key_value_and_what_is_allowed(keys, said):
-    with pytest.raises(SceneError) as told:
-        chutelab.load(table(**keys))
-    assert said in str(told.value)
-
-
 def test_the_drive_of_a_drum_pays_what_is_lost():
     """Once the slope stands, its work is what bounces and slip take, within 2 %."""
     drum = {"name": "drum", "center": [0.0, 0.0], "radius": 0.2, "turn": 180.0, "friction": 0.4}

@@ -18,7 +18,7 @@ from chutelab.cli import main
 from chutelab.results.quantities import measure
 from chutelab.util.errors import InputError
 from chutelab.util.words import LANGUAGES, words
-from shared import find, lessons
+from shared import find, lessons, some
 
 G = 9.81
 LESSONS = lessons()
@@ -61,7 +61,7 @@ def test_shipped_notebooks_are_what_their_lessons_make_of_them(lesson):
     assert shipped == notebook_of(lesson).encode(), f"run: chutelab lesson build {lesson.number}"
 
 
-@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.name)
+@pytest.mark.parametrize("lesson", some(LESSONS), ids=lambda lesson: lesson.name)
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_page_worksheet_and_notebook_ask_the_same(lesson, language):
     """Each text, question, choice and row of each step is on all three."""

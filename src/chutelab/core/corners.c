@@ -220,14 +220,16 @@ static void fill_in(const Shape *a, const Shape *b, Touch *t) {
 }
 
 /* The side of a segment that a corner is on: its own. Where the line from it to the centre, which is inside the shape,
-   crosses the segment, it has sunk through, and is on the side of the centre. */
-static int side_of(const Shape *a, const Surface *s, int corner) {
+   crosses the segment, it has sunk through, and is on the side of the centre; so it is `near` its ends, too: what has
+   sunk into two walls is beyond the end of each. */
+static int side_of(const Shape *a, const Surface *s, int corner, double near) {
     double x = a->p[corner][0] - s->x, y = a->p[corner][1] - s->y, u = a->x - s->x, v = a->y - s->y;
     double off = y * s->tx - x * s->ty, mid = v * s->tx - u * s->ty, both = fabs(off) + fabs(mid);
+    double over = fabs(off) <= near ? near : 0;
     int own = off >= 0 ? 1 : -1, centre = mid >= 0 ? 1 : -1;
     if (own == centre) return own;
     double cut = ((x * s->tx + y * s->ty) * fabs(mid) + (u * s->tx + v * s->ty) * fabs(off)) / both;
-    return cut >= 0 && cut <= s->length ? centre : own;
+    return cut >= -over && cut <= s->length + over ? centre : own;
 }
 
 /* Whether a corner is inside the circle of an arc: on its own, or by the centre where the line to it, inside the shape,
@@ -253,7 +255,7 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
         const double *q = a->p[t->which];
         if (b->s && b->s->shape == SEGMENT) {
             double along = (q[0] - b->s->x) * b->s->tx + (q[1] - b->s->y) * b->s->ty;
-            t->on = side_of(a, b->s, t->which);
+            t->on = side_of(a, b->s, t->which, near);
             fill_in(a, b, t);
             return along >= -near && along <= b->s->length + near;
         }
@@ -496,7 +498,7 @@ double meet_corners(int i, int j, double from, double until, double soft) {
     for (int c = 0; c < count; c++) {
         Touch now = {.which = c};
         /* The side that it is on does not change within a step. */
-        if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c);
+        if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c, near);
         gap[c] = gap_at(&a, &b, near, &now);
         closed |= gap[c] <= 0;
         if (gap[c] <= most * span) in_reach[many++] = c;

@@ -86,8 +86,9 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     /* Surfaces do not give way: with them it grows only if jams do not help. */
     int many = sunk ? STUCK : surface >= 0 ? 2 * JAM : MANY;
     if (impacts <= many) return least;
-    double most = skip * (MOST_SKIP / SKIP) * pow(GROW, MIN(MAX(impacts - STUCK, 0), 1000));
-    return MAX(least, MIN(skip * pow(GROW, MIN(impacts - many, 1000)), most));
+    double most = skip * (MOST_SKIP / SKIP) * (impacts > STUCK ? pow(GROW, MIN(impacts - STUCK, 1000)) : 1);
+    for (int n = MIN(impacts - many, 1000); n > 0 && skip < most; n--) skip *= GROW;
+    return MAX(least, MIN(skip, most));
 }
 
 /* The same of two disks of a crowd at t: of those that rest on something also what is late, see LATE. */

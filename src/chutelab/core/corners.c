@@ -18,6 +18,10 @@
 #define QUICK 20
 /* Cosine of an angle between edge and surface from which on a corner near its end counts as on it. */
 #define FLAT 0.9
+/* Share of what counts as near: what is inside by less may be so by rounding. */
+#define DEEP 0.2
+/* ... and past an end. */
+#define ROUNDED 1e-6
 /* Sweeps of a blow at several places, and of its size, at which they end; those after which it is first solved at once. */
 #define SWEEPS 2000
 #define ENDS 1e-15
@@ -248,6 +252,9 @@ static int is_inside(const Shape *a, const Surface *s, int corner) {
     return s->shape == CIRCLE || x * s->tx + y * s->ty >= s->cos_half * s->radius ? centre : own;
 }
 
+/* By how much a corner may be past an end of a segment and on it: by rounding where the segment does not go on. */
+static double past_end(const Surface *s, int end, double near) { return mate_of(s, end) < 0 ? ROUNDED * near : near; }
+
 /* Find what a candidate is on; 0 if it is none that touches. */
 static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
     double off, n[2];
@@ -257,7 +264,7 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
             double along = (q[0] - b->s->x) * b->s->tx + (q[1] - b->s->y) * b->s->ty;
             t->on = side_of(a, b->s, t->which, near);
             fill_in(a, b, t);
-            return along >= -near && along <= b->s->length + near;
+            return along >= -past_end(b->s, 0, near) && along <= b->s->length + past_end(b->s, 1, near);
         }
         if (b->s) {
             double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);
@@ -311,10 +318,16 @@ static int list_between(const Shape *a, const Shape *b, double near, double with
         Touch *now = list + count;
         now->which = c;
         if (!find_place(a, b, near, now) || now->gap > within) continue;
+        /* Beside corners of both particles it may be inside by another edge than the one that they are apart by. */
+        if (!b->s && now->gap < -DEEP * near && are_apart(a, b, 0)) continue;
         int known = 0;
-        for (int n = 0; n < count && c >= a->count; n++)
-            known |= length_of(list[n].x - now->x, list[n].y - now->y) <= near
-                && (c - a->count != b->round || list[n].nx * now->nx + list[n].ny * now->ny > FLAT);
+        for (int n = 0; n < count && c >= a->count; n++) {
+            if (length_of(list[n].x - now->x, list[n].y - now->y) > near) continue;
+            if (c - a->count == b->round && list[n].nx * now->nx + list[n].ny * now->ny <= FLAT) continue;
+            known = 1;
+            /* A corner that slides off an end leaves by its edge. */
+            if (b->s && b->round < 0 && now->gap <= 0) list[n] = *now;
+        }
         count += !known;
     }
     return count;
@@ -486,6 +499,18 @@ static int closes_faster(int i, int j, const Shape *a, const Shape *b, double t,
     return 0;
 }
 
+/* The instant within (low, high] from which on a place at which two touch closes faster than `soft`: what rolls from a
+   corner on to an edge, round a disk or a rim, touches all the while. */
+static double rolls_at(int i, int j, double low, double high, double soft) {
+    for (int n = 0; n < QUICK; n++) {
+        double middle = 0.5 * (low + high);
+        Shape a = shape_of(i, middle), b = shape_of(j, middle);
+        if (closes_faster(i, j, &a, &b, middle, TOUCHING * inner_of(i, j), soft)) high = middle;
+        else low = middle;
+    }
+    return high;
+}
+
 /* When particle i, which has corners, meets j between two times faster than `soft`: the instant, or INFINITY. */
 double meet_corners(int i, int j, double from, double until, double soft) {
     double span = until - from, most = fastest_of(i, j, from, span), small = inner_of(i, j), near = TOUCH * small;
@@ -519,6 +544,9 @@ double meet_corners(int i, int j, double from, double until, double soft) {
             /* It may have been moved on to another's root. */
             if (j < 0) b2.s = surface_at(-1 - j, t);
             gap[c] = gap_at(&a2, &b2, near, &now);
+            if (before <= 0 && gap[c] < before && c - a.count == b.round
+                && closes_faster(i, j, &a2, &b2, t, TOUCHING * small, soft))
+                first = MIN(first, rolls_at(i, j, last, t, soft));
             if (!(before > 0 && gap[c] <= 0)) continue;
             double then = root_of(i, j, &now, last, t, before, gap[c]);
             if (then >= first) continue;

@@ -183,8 +183,12 @@ void foresee(int i) {
     else if (d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs)))
         foresee_surfaces(i, &due, &partner);
     if (d->mode == FREE) {
-        for (int link = W.later_count < 0 ? -1 : d->nears; link >= 0; link = W.near_links[link])
-            if (is_live(W.disks + W.near[link ^ 1])) foresee_pair(i, W.near[link ^ 1], &due, &partner);
+        for (int link = W.later_count < 0 ? -1 : d->nears; link >= 0; link = W.near_links[link]) {
+            int j = W.near[link ^ 1];
+            /* Of two that the shock has moved the one that comes last looks. */
+            if (!is_live(W.disks + j) || (is_cornered(i, j) && W.disks[j].moved == W.shocks)) continue;
+            foresee_pair(i, j, &due, &partner);
+        }
         int n = W.later_count < 0 ? reachable(i) : 0;
         for (int k = 0; k < n; k++) foresee_pair(i, W.found[k], &due, &partner);
     }
@@ -724,6 +728,7 @@ void shock(int i, int j, double t) {
     if (!W.interact) W.step_end = t;
     for (int k = 0; k < W.moved_count; k++) {
         int m = W.moved[k];
+        W.disks[m].moved = 0;
         if (W.disks[m].mode == FREE) {
             enter_again(m, W.step_end);
             if (W.woken) list_again(m);

@@ -17,9 +17,6 @@ from chutelab.machine.parts import (
     Mover,
     Particle,
     Pulley,
-    moved,
-    origin,
-    upright,
 )
 from chutelab.machine.releases import RefusedError
 from chutelab.machine.shapes import Arcs, Pieces, Segments
@@ -27,5 +24,4 @@ from chutelab.machine.shapes import Arcs, Pieces, Segments
 __all__ = [
     "DRIVE_PULLEY", "PASSES", "SWING", "Arcs", "Caution", "Joint", "Machine", "Mover",
     "Particle", "Pieces", "Pulley", "RefusedError", "Segments", "ahead", "build", "hand_over",
-    "moved", "origin", "upright",
 ]  # fmt: skip

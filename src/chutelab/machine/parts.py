@@ -1,16 +1,15 @@
 """`Machine` and its parts: what the engines take, and all they take.
 
-Also here: a place near the machine to count positions from, since far from the world's origin
-coordinates have few digits left; and how surfaces move: a `Mover` is where one is at any time, what
-hangs on a hinge once it has run. It is for what draws machines and checks runs, and for Pymunk's
-bodies; the core has its own (motion.c).
+Also here: how surfaces move. A `Mover` is where one is at any time, what hangs on a hinge once it
+has run. It is for what draws machines and checks runs, and for Pymunk's bodies; the core has its
+own (motion.c).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import ceil, inf, isnan, log2, nan, pi
+from math import inf, isnan, nan, pi
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
@@ -389,71 +388,6 @@ class Machine:
             owners = np.setdiff1d(np.concatenate(into), [0])
             said += [Caution(self.surfaces[owner], DRIVE_PULLEY) for owner in owners]
         return (*self.plate_warnings, *said)
-
-
-def upright(machine: Machine) -> Machine:
-    """Return a machine that stays where it is, turned so that gravity is straight down."""
-    frame = machine.frame.T
-    segments, arcs, releases = machine.segments, machine.arcs, machine.releases
-    return replace(
-        machine,
-        segments=replace(segments, start=segments.start @ frame, tangent=segments.tangent @ frame),
-        arcs=replace(arcs, center=arcs.center @ frame, begin=arcs.begin - machine.tilt),
-        releases=replace(
-            releases,
-            position=releases.position @ frame,
-            velocity=releases.velocity @ frame,
-        ),
-    )
-
-
-REMOTE = 8.0
-"""Distance from the world's origin, in machine sizes, beyond which a local origin is used."""
-
-
-def origin(machine: Machine) -> tuple[float, float]:
-    """Return the world point that the engine calculates from, m: near the machine.
-
-    It is (0, 0) unless the machine is many times its own size away from there; and so round a
-    number that taking it off a coordinate loses no digit.
-    """
-    if machine.pulley is not None or not (corners := machine.corners).size:
-        return 0.0, 0.0
-    axes = tuple(range(corners.ndim - 1))
-    low, high = corners.min(axis=axes), corners.max(axis=axes)
-    extent = float((high - low).max())
-    middle = 0.5 * (low + high)
-    if np.abs(middle).max() <= REMOTE * extent:
-        return 0.0, 0.0
-    unit = 2.0 ** ceil(log2(extent))
-    x, y = (round(float(c) / unit) * unit for c in middle)
-    return x, y
-
-
-def moved(machine: Machine, x: float, y: float) -> Machine:
-    """Return a machine without a pulley, moved by (x, y), m."""
-    if not (x or y):
-        return machine
-    by = np.array([x, y])
-    segments, releases = machine.segments, machine.releases
-    return replace(
-        machine,
-        segments=replace(segments, start=segments.start + by),
-        arcs=replace(machine.arcs, center=machine.arcs.center + by),
-        releases=replace(
-            releases,
-            position=releases.position + by,
-            exit_box=releases.exit_box + np.tile(by, 2),
-        ),
-        joints=tuple(
-            replace(joint, anchor=joint.anchor and (joint.anchor[0] + x, joint.anchor[1] + y))
-            for joint in machine.joints
-        ),
-        movers=tuple(
-            replace(mover, pivot=(mover.pivot[0] + x, mover.pivot[1] + y))
-            for mover in machine.movers
-        ),
-    )
 
 
 SWING = np.dtype([

@@ -1,18 +1,20 @@
 """Collecting knots, events and ledger entries while an engine runs.
 
 Engines hand over whole arrays in the order of time *per particle*; sorting happens once, at the
-end.
+end. They count positions from a place near the machine: far from the world's origin coordinates
+have few digits left.
 """
 
 from __future__ import annotations
 
-from math import ceil
+from dataclasses import replace
+from math import ceil, log2
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine import SWING, Machine, moved, origin, upright
+from chutelab.machine import SWING, Machine
 from chutelab.results.loads import Bins
 from chutelab.results.record import EVENT, KNOT, LASTING, LOAD, REASONS, TOTAL, Kind, Record
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -59,11 +61,76 @@ WAYS = frozenset(("position", "velocity", "velocity_before", "velocity_after", "
 """Vectors among what is told of knots, events and loads."""
 
 
+def upright(machine: Machine) -> Machine:
+    """Return a machine that stays where it is, turned so that gravity is straight down."""
+    frame = machine.frame.T
+    segments, arcs, releases = machine.segments, machine.arcs, machine.releases
+    return replace(
+        machine,
+        segments=replace(segments, start=segments.start @ frame, tangent=segments.tangent @ frame),
+        arcs=replace(arcs, center=arcs.center @ frame, begin=arcs.begin - machine.tilt),
+        releases=replace(
+            releases,
+            position=releases.position @ frame,
+            velocity=releases.velocity @ frame,
+        ),
+    )
+
+
+REMOTE = 8.0
+"""Distance from the world's origin, in machine sizes, beyond which a local origin is used."""
+
+
+def origin(machine: Machine) -> tuple[float, float]:
+    """Return the world point that the engine calculates from, m: near the machine.
+
+    It is (0, 0) unless the machine is many times its own size away from there; and so round a
+    number that taking it off a coordinate loses no digit.
+    """
+    if machine.pulley is not None or not (corners := machine.corners).size:
+        return 0.0, 0.0
+    axes = tuple(range(corners.ndim - 1))
+    low, high = corners.min(axis=axes), corners.max(axis=axes)
+    extent = float((high - low).max())
+    middle = 0.5 * (low + high)
+    if np.abs(middle).max() <= REMOTE * extent:
+        return 0.0, 0.0
+    unit = 2.0 ** ceil(log2(extent))
+    x, y = (round(float(c) / unit) * unit for c in middle)
+    return x, y
+
+
+def moved(machine: Machine, x: float, y: float) -> Machine:
+    """Return a machine without a pulley, moved by (x, y), m."""
+    if not (x or y):
+        return machine
+    by = np.array([x, y])
+    segments, releases = machine.segments, machine.releases
+    return replace(
+        machine,
+        segments=replace(segments, start=segments.start + by),
+        arcs=replace(machine.arcs, center=machine.arcs.center + by),
+        releases=replace(
+            releases,
+            position=releases.position + by,
+            exit_box=releases.exit_box + np.tile(by, 2),
+        ),
+        joints=tuple(
+            replace(joint, anchor=joint.anchor and (joint.anchor[0] + x, joint.anchor[1] + y))
+            for joint in machine.joints
+        ),
+        movers=tuple(
+            replace(mover, pivot=(mover.pivot[0] + x, mover.pivot[1] + y))
+            for mover in machine.movers
+        ),
+    )
+
+
 class Recorder:
     """Grows by chunks; `finish` turns it into a frozen `Record` of the machine's run.
 
     With `apart`, `by_surface` is kept for each particle, (N, S, 3). What is written down is counted
-    from `origin`, m, see `chutelab.machine.origin`: engines run `near`, the machine moved there;
+    from `origin`, m, see the function: engines run `near`, the machine moved there;
     `turned` so that gravity is straight down, if they know it so alone.
     """
 

@@ -279,7 +279,7 @@ def falls(gap: float, rate: float, pull: float) -> float:
 
 
 class World:
-    """A Space with all surfaces of a machine, counted from near its place (`machine.origin`).
+    """A Space with all surfaces of a machine, counted from near its place (`recorder.origin`).
 
     `faces` are its segments, in their order, the pulley, the arcs and their ends, as one particle
     meets them; `gates` tells whether some are not there all the time. Gaps up to `hair` (m) are

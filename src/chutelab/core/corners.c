@@ -12,6 +12,8 @@
 /* Strides of a span in which gaps are looked at, at least: a touch that comes and goes within one is left to the
    next step. */
 #define STRIDES 8
+/* rad; what turns by more in a span may leave something round by one corner and meet it by the next. */
+#define ROLLS 0.05
 /* Halvings to the instant of a blow, to its last bit. */
 #define TO_ROOT 200
 /* ... and quicker steps before them. */
@@ -504,10 +506,14 @@ double meet_corners(int i, int j, double from, double until, double soft) {
         if (gap[c] <= most * span) in_reach[many++] = c;
     }
     if (closed && closes_faster(i, j, &a, &b, from, 0, soft)) return from;
+    /* On what is round all corners are one candidate: when one leaves, the next may come. */
+    int rolls = b.round >= 0 && span * (fabs(W.disks[i].spin) + (j < 0 ? 0 : fabs(W.disks[j].spin))) > ROLLS;
     while (h < span && first == INFINITY && many) {
         double least = INFINITY, last = from + h;
-        for (int n = 0; n < many; n++)
+        for (int n = 0; n < many; n++) {
             if (gap[in_reach[n]] > 0) least = MIN(least, gap[in_reach[n]]);
+            else if (rolls && in_reach[n] == a.count + b.round) least = 0;
+        }
         h = MIN(h + MAX(least / most, span / STRIDES), span);
         double t = h < span ? from + h : until;
         Shape a2 = shape_of(i, t), b2 = shape_of(j, t);
@@ -519,8 +525,14 @@ double meet_corners(int i, int j, double from, double until, double soft) {
             /* It may have been moved on to another's root. */
             if (j < 0) b2.s = surface_at(-1 - j, t);
             gap[c] = gap_at(&a2, &b2, near, &now);
-            if (!(before > 0 && gap[c] <= 0)) continue;
-            double then = root_of(i, j, &now, last, t, before, gap[c]);
+            int next = rolls && before <= 0 && c == a.count + b.round && closes_faster(i, j, &a2, &b2, t, 0, soft);
+            if (!(gap[c] <= 0 && (before > 0 || next))) continue;
+            double then = next ? t : root_of(i, j, &now, last, t, before, gap[c]);
+            for (double low = last, middle; next && (middle = 0.5 * (low + then)) > low && middle < then;) {
+                Shape a3 = shape_of(i, middle), b3 = shape_of(j, middle);
+                if (closes_faster(i, j, &a3, &b3, middle, 0, soft)) then = middle;
+                else low = middle;
+            }
             if (then >= first) continue;
             Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
             if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;

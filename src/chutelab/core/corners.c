@@ -222,16 +222,17 @@ static void fill_in(const Shape *a, const Shape *b, Touch *t) {
 }
 
 /* The side of a segment that a corner is on: its own. Where the line from it to the centre, which is inside the shape,
-   crosses the segment, it has sunk through, and is on the side of the centre; so it is `near` its ends, too: what has
-   sunk into two walls is beyond the end of each. */
+   crosses the segment, it has sunk through, and is on the side of the centre; so it is `near` an end where another goes
+   on to that side: what has sunk into two walls is beyond the end of each. */
 static int side_of(const Shape *a, const Surface *s, int corner, double near) {
     double x = a->p[corner][0] - s->x, y = a->p[corner][1] - s->y, u = a->x - s->x, v = a->y - s->y;
     double off = y * s->tx - x * s->ty, mid = v * s->tx - u * s->ty, both = fabs(off) + fabs(mid);
-    double over = fabs(off) <= near ? near : 0;
     int own = off >= 0 ? 1 : -1, centre = mid >= 0 ? 1 : -1;
     if (own == centre) return own;
     double cut = ((x * s->tx + y * s->ty) * fabs(mid) + (u * s->tx + v * s->ty) * fabs(off)) / both;
-    return cut >= -over && cut <= s->length + over ? centre : own;
+    int hollow = centre > 0 ? 1 : 2, sunk = fabs(off) <= near;
+    double low = sunk && (s->hollows[0] & hollow) ? -near : 0, high = sunk && (s->hollows[1] & hollow) ? near : 0;
+    return cut >= low && cut <= s->length + high ? centre : own;
 }
 
 /* Whether a corner is inside the circle of an arc: on its own, or by the centre where the line to it, inside the shape,

@@ -35,15 +35,17 @@ def tables(seed):
         return drawn
 
 
-def bodies(seed, *, few=False):
+def bodies(seed, *, few=False, both=False):
     """Return a scene of boxes, polygons and disks that can be built; `few` is one or two of them.
+
+    Things hang on hinges, or particles are tied by joints, or `both`.
 
     Sizes are 14 to 130 mm, speeds up to 1 m/s; they fall by up to 1.2 m among up to four things
     that stand, hang or move, or share points.
     """
     rng = np.random.default_rng(seed)
     while True:
-        drawn = Bodies(rng, few=few).tables
+        drawn = Bodies(rng, few=few, both=both).tables
         try:
             build(from_dict(drawn))
         except SceneError:
@@ -311,11 +313,11 @@ class Drawing(Dice):
 
 
 class Bodies(Dice):
-    """One attempt at a scene of boxes, polygons and disks; with hinges or with joints."""
+    """One attempt at a scene of boxes, polygons and disks; with hinges, with joints, or `both`."""
 
-    def __init__(self, rng, *, few):
+    def __init__(self, rng, *, few, both):
         super().__init__(rng)
-        self.few, self.hangs, self.rows = few, self.chance(0.6), []
+        self.few, self.hangs, self.rows = few, self.chance(0.6) or both, []
         self.tables = {"run": {"until": 0.35 if few else self.number(0.6, 1.0)}}
         if self.chance(0.2):
             self.tables |= self.one_of(
@@ -324,7 +326,7 @@ class Bodies(Dice):
         self._kinds()
         self._furniture()
         self._streams()
-        if not self.hangs:
+        if both or not self.hangs:
             self._joints()
 
     def values(self):

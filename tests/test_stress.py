@@ -291,12 +291,12 @@ def test_what_the_laws_are_not_about_is_refused_by_its_key(name, key):
 @pytest.mark.parametrize(
     "words",
     [
-        "spoon", "spoon --engine contact", "cascade", "two-sizes", "two-sizes --engine pymunk",
-        "inclined-conveyor", "inclined-conveyor --engine contact",
+        "spoon", "two-sizes --engine pymunk", "inclined-conveyor --engine contact",
         "hopper --set stream.count=50 --set run.max_time=0.6",
         *(
             pytest.param(words, marks=pytest.mark.slow)
             for words in (
+                "spoon --engine contact", "cascade", "two-sizes", "inclined-conveyor",
                 "hopper", "hopper --engine pymunk", "heap", "rock-box", "stream",
                 "hopper --set stream.count=50 --set run.max_time=0.6 --engine pymunk",
                 "spoon --engine pymunk", "cascade --engine contact", "cascade --engine pymunk",

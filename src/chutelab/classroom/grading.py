@@ -379,8 +379,26 @@ def write_csv(grades: Iterable[Grade], path: str | Path, *, decimal_comma: bool 
 
 
 def _of_notebook(file: str, time_limit: float) -> Grade:
+    """Mark the lesson and student with most answers of what a notebook reports as worked on.
+
+    Raises a `ForgedError` if that is no report of a chutelab: unknown code ran there.
+    """
     ran = run(code_of(Path(file)), time_limit)
-    works = _works(ran.tasks)
+    if not isinstance(ran.tasks, list) or len(ran.tasks) > (OPENED.maxlen or 0):
+        raise ForgedError("its report is not a list of tasks, or too long a one")
+    found: dict[tuple[str, str], Work] = {}
+    for one in ran.tasks:
+        try:
+            work = _work(one)
+        except ValueError as error:
+            raise ForgedError(f"its report is not from chutelab: {error}") from None
+        first = found.setdefault((work.lesson, normalized(work.student)), work)
+        first.answers |= work.answers
+        first.tries |= work.tries
+        first.hints |= work.hints
+        first.revealed += work.revealed
+    # Each lesson and student once, in the order they were opened.
+    works = list(found.values())
     if not works:
         nothing = "no exercise was opened: lesson(…) was never called"
         return Grade(file, reason=ran.trouble or nothing)
@@ -412,27 +430,6 @@ def _marked(file: str, work: Work, reasons: Sequence[str] = ()) -> Grade:
         mistakes={reply.question: reply.mistake for reply in replies if reply.mistake},
         words={key: text.strip() for key, text in work.words.items() if text.strip()},
     )
-
-
-def _works(reports: object) -> list[Work]:
-    """Return what was worked on, each lesson and student once, in the order they were opened.
-
-    Raises a `ForgedError` if that is no report of a chutelab: unknown code ran there.
-    """
-    if not isinstance(reports, list) or len(reports) > (OPENED.maxlen or 0):
-        raise ForgedError("its report is not a list of tasks, or too long a one")
-    works: dict[tuple[str, str], Work] = {}
-    for one in reports:
-        try:
-            work = _work(one)
-        except ValueError as error:
-            raise ForgedError(f"its report is not from chutelab: {error}") from None
-        first = works.setdefault((work.lesson, normalized(work.student)), work)
-        first.answers |= work.answers
-        first.tries |= work.tries
-        first.hints |= work.hints
-        first.revealed += work.revealed
-    return list(works.values())
 
 
 _MARKUP: Final = re.compile(r"[\\`*_\[\]<>|&~]")

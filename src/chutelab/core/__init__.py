@@ -187,11 +187,15 @@ class Module:
         return rows
 
     def take_events(self, of: str = "World") -> NDArray[Any]:
-        """Return all events as the bytes of rows of `results.EVENT`, and make room for others."""
+        """Return all events as the bytes of rows of `results.EVENT`, and make room for others.
+
+        Those of a run that is over stay where they are: as `array`, good until the next call.
+        """
         struct, room = self.structs[of], self.structs["Room"]
         size: int = room.packed or self.call("pack_events", struct.events, struct.event_count)
+        rows, over = self._bytes[struct.events : struct.events + size], bool(room.packed)
         struct.event_count = room.packed = 0
-        return self._bytes[struct.events : struct.events + size].copy()
+        return rows if over else rows.copy()
 
     def fill(self, of: str, **arrays: NDArray[Any]) -> None:
         """Copy arrays, flat and contiguous, to where the fields of a struct point."""

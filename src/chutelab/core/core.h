@@ -59,7 +59,7 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 /* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
 #define REST 2.5e-3
 /* s on Earth; so long an island has to be at rest. */
-#define CALM_DOWN 0.1
+#define CALM_DOWN 0.05
 /* Of the speed; a slower approach grazes, and rounding may well have made it. */
 #define GRAZE 1e-6
 /* Friction, 76 degrees, that takes all slip in any blow; where sweeps diverge it is lowered from here. */

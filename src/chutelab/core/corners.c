@@ -20,6 +20,10 @@
 #define QUICK 20
 /* Cosine of an angle between edge and surface from which on a corner near its end counts as on it. */
 #define FLAT 0.9
+/* Share of what counts as near: what is inside by less may be so by rounding. */
+#define DEEP 0.2
+/* ... and past an end. */
+#define ROUNDED 1e-6
 /* Sweeps of a blow at several places, and of its size, at which they end; those after which it is first solved at once. */
 #define SWEEPS 2000
 #define ENDS 1e-15
@@ -41,6 +45,7 @@ typedef struct {
     const double *edges;    /* of a polygon, see `World.edges` */
     const Surface *s;
     int count, round;       /* points, of which one may have a radius, or -1 */
+    int facing;             /* of two polygons: the edge that most of the other is out of, see `are_apart` */
 } Shape;
 
 /* Cosine and sine of the angle of a particle; of two angles each they are kept. */
@@ -58,7 +63,6 @@ static Shape shape_of(int j, double t) {
     out.round = -1;
     out.count = 0;
     out.s = 0;
-    out.count = 0;
     if (j < 0) {
         const Surface *s = out.s = surface_at(-1 - j, t);
         if (s->shape != CIRCLE) {
@@ -133,26 +137,24 @@ static double clear_of(const Shape *a, int edge, const Shape *b) {
    counts how it goes on from its end, by the radius of the circle inside `a`: so the edge that a corner leaves over the
    end on is the one that it came on. */
 static int edge_under(const Shape *a, const Shape *b, const double *q, double near) {
-    double off, best = -INFINITY;
+    double off, best = -INFINITY, on = near / TOUCH;
     int found = furthest(a, q, &off);
-    Shape end;
     if (off >= near) return found;
-    if (b->s) {
-        double x = b->s->tx, y = b->s->ty, on = near / TOUCH;
-        if (b->s->shape == ARC) {
-            x = (q[1] - b->s->y) / b->radius;
-            y = (b->s->x - q[0]) / b->radius;
-            if (x * b->s->tx + y * b->s->ty < 0) on = -on;
-        } else if (q != b->p[0]) on = -on;
-        memcpy(end.p[0], q, sizeof end.p[0]);
-        end.p[1][0] = q[0] + on * x;
-        end.p[1][1] = q[1] + on * y;
-        end.count = 2;
-        end.round = -1;
-        b = &end;
-    }
+    if (!b->s) return a->facing;
+    Shape end;
+    end.count = 2;
+    end.round = -1;
+    double x = b->s->tx, y = b->s->ty;
+    if (b->s->shape == ARC) {
+        x = (q[1] - b->s->y) / b->radius;
+        y = (b->s->x - q[0]) / b->radius;
+        if (x * b->s->tx + y * b->s->ty < 0) on = -on;
+    } else if (q != b->p[0]) on = -on;
+    memcpy(end.p[0], q, sizeof end.p[0]);
+    end.p[1][0] = q[0] + on * x;
+    end.p[1][1] = q[1] + on * y;
     for (int e = 0; e < a->count; e++) {
-        double clear = clear_of(a, e, b);
+        double clear = clear_of(a, e, &end);
         if (clear <= best) continue;
         best = clear;
         found = e;
@@ -160,13 +162,23 @@ static int edge_under(const Shape *a, const Shape *b, const double *q, double ne
     return found;
 }
 
+/* Whether two polygons are apart by more than that along an edge of the first; if not, note which is facing. */
+static int are_apart_along(Shape *a, const Shape *b, double by) {
+    double best = -INFINITY;
+    for (int e = 0; e < a->count; e++) {
+        double clear = clear_of(a, e, b);
+        if (clear > by) return 1;
+        if (clear <= best) continue;
+        best = clear;
+        a->facing = e;
+    }
+    return 0;
+}
+
 /* Whether a polygon and something else are apart by more than that: along an edge of one, or within a rim. */
-static int are_apart(const Shape *a, const Shape *b, double by) {
-    for (int e = 0; e < a->count; e++)
-        if (clear_of(a, e, b) > by) return 1;
-    for (int e = 0; e < b->count && b->round < 0 && !b->s; e++)
-        if (clear_of(b, e, a) > by) return 1;
-    if (!b->s) return 0;
+static int are_apart(Shape *a, Shape *b, double by) {
+    if (are_apart_along(a, b, by)) return 1;
+    if (!b->s) return b->round < 0 && are_apart_along(b, a, by);
     double low = INFINITY, high = -INFINITY;
     for (int n = 0; n < a->count; n++) {
         double x = a->p[n][0] - b->s->x, y = a->p[n][1] - b->s->y;
@@ -251,6 +263,9 @@ static int is_inside(const Shape *a, const Surface *s, int corner) {
     return s->shape == CIRCLE || x * s->tx + y * s->ty >= s->cos_half * s->radius ? centre : own;
 }
 
+/* By how much a corner may be past an end of a segment and on it: by rounding where the segment does not go on. */
+static double past_end(const Surface *s, int end, double near) { return mate_of(s, end) < 0 ? ROUNDED * near : near; }
+
 /* Find what a candidate is on; 0 if it is none that touches. */
 static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
     double off, n[2];
@@ -260,7 +275,7 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
             double along = (q[0] - b->s->x) * b->s->tx + (q[1] - b->s->y) * b->s->ty;
             t->on = side_of(a, b->s, t->which, near);
             fill_in(a, b, t);
-            return along >= -near && along <= b->s->length + near;
+            return along >= -past_end(b->s, 0, near) && along <= b->s->length + past_end(b->s, 1, near);
         }
         if (b->s) {
             double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);
@@ -307,17 +322,26 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
 double inner_of(int i, int j) { return j < 0 ? W.disks[i].inner : MIN(W.disks[i].inner, W.disks[j].inner); }
 
 /* List the places at which a polygon is nearer than `within` to something else, up to MOST_TOUCHES. */
-static int list_between(const Shape *a, const Shape *b, double near, double within, Touch *list) {
-    int count = 0;
+static int list_between(Shape *a, Shape *b, double near, double within, Touch *list) {
+    int count = 0, both = !b->s && b->round < 0;
     if (are_apart(a, b, within + near)) return 0;
     for (int c = 0; c < a->count + b->count && count < MOST_TOUCHES; c++) {
         Touch *now = list + count;
         now->which = c;
+        /* Whichever edge it is on, it is out of that by as much. */
+        if (both && (c < a->count ? off_edge(b, b->facing, a->p[c]) : off_edge(a, a->facing, b->p[c - a->count])) > within)
+            continue;
         if (!find_place(a, b, near, now) || now->gap > within) continue;
+        /* Beside corners of both particles it may be inside by another edge than the one that they are apart by. */
+        if (!b->s && now->gap < -DEEP * near && are_apart(a, b, 0)) continue;
         int known = 0;
-        for (int n = 0; n < count && c >= a->count; n++)
-            known |= length_of(list[n].x - now->x, list[n].y - now->y) <= near
-                && (c - a->count != b->round || list[n].nx * now->nx + list[n].ny * now->ny > FLAT);
+        for (int n = 0; n < count && c >= a->count; n++) {
+            if (length_of(list[n].x - now->x, list[n].y - now->y) > near) continue;
+            if (c - a->count == b->round && list[n].nx * now->nx + list[n].ny * now->ny <= FLAT) continue;
+            known = 1;
+            /* A corner that slides off an end leaves by its edge. */
+            if (b->s && b->round < 0 && now->gap <= 0) list[n] = *now;
+        }
         count += !known;
     }
     return count;
@@ -455,6 +479,15 @@ static double gap_at(const Shape *a, const Shape *b, double near, Touch *at) {
     return at->gap;
 }
 
+/* The least gap that a corner of one polygon may have to the other within a span, from that which it has, at an edge of
+   one of them, at t: turning bends its way, by so much m/s2 at most. */
+static double least_gap(int i, int j, const Shape *a, const Shape *b, double t, double span, double bends, Touch *at) {
+    double off;
+    at->on = at->which < a->count ? furthest(b, a->p[at->which], &off) : furthest(a, b->p[at->which - a->count], &off);
+    fill_in(a, b, at);
+    return at->gap - (closes_at(i, j, a, b, t, at) + 0.5 * bends * span) * span;
+}
+
 /* The instant within (low, high] at which the gap of a candidate closes, from `above` 0 to `below`: by false position,
    where an end that stays counts half (the Illinois rule), to the last bit. */
 static double root_of(int i, int j, Touch *at, double low, double high, double above, double below) {
@@ -481,12 +514,24 @@ static double root_of(int i, int j, Touch *at, double low, double high, double a
 }
 
 /* Whether a place at which two touch at t, when they are as that, closes faster than `soft`. */
-static int closes_faster(int i, int j, const Shape *a, const Shape *b, double t, double within, double soft) {
+static int closes_faster(int i, int j, Shape *a, Shape *b, double t, double within, double soft) {
     Touch places[MOST_TOUCHES];
     int count = list_between(a, b, TOUCH * inner_of(i, j), within, places);
     for (int n = 0; n < count; n++)
         if (closes_at(i, j, a, b, t, places + n) > soft) return 1;
     return 0;
+}
+
+/* The instant within (low, high] from which on a place at which two touch closes faster than `soft`: what rolls from a
+   corner on to an edge, round a disk or a rim, touches all the while. */
+static double rolls_at(int i, int j, double low, double high, double soft) {
+    for (int n = 0; n < QUICK; n++) {
+        double middle = 0.5 * (low + high);
+        Shape a = shape_of(i, middle), b = shape_of(j, middle);
+        if (closes_faster(i, j, &a, &b, middle, TOUCHING * inner_of(i, j), soft)) high = middle;
+        else low = middle;
+    }
+    return high;
 }
 
 /* When particle i, which has corners, meets j between two times faster than `soft`: the instant, or INFINITY. */
@@ -496,25 +541,26 @@ double meet_corners(int i, int j, double from, double until, double soft) {
     int sides[MOST_CORNERS], in_reach[CANDIDATES], many = 0, closed = 0;
     if (!(span > 0) || most == INFINITY || most <= soft) return INFINITY;
     Shape a = shape_of(i, from), b = shape_of(j, from);
-    int count = a.count + b.count, on_segment = b.s && b.s->shape == SEGMENT;
+    int count = a.count + b.count, on_segment = b.s && b.s->shape == SEGMENT, both = !b.s && b.round < 0;
+    double turn = both ? fabs(W.disks[i].spin) + fabs(W.disks[j].spin) : 0;
+    double bends = turn * (2 * most + 4 * turn * MAX(W.disks[i].radius, both ? W.disks[j].radius : 0));
     if (are_apart(&a, &b, most * span + near)) return INFINITY;
+    /* On what is round all corners are one candidate: when one leaves, the next may come. */
+    int rolls = b.round >= 0 && span * (fabs(W.disks[i].spin) + (j < 0 ? 0 : fabs(W.disks[j].spin))) > ROLLS;
     for (int c = 0; c < count; c++) {
         Touch now = {.which = c};
         /* The side that it is on does not change within a step. */
         if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c, near);
         gap[c] = gap_at(&a, &b, near, &now);
         closed |= gap[c] <= 0;
-        if (gap[c] <= most * span) in_reach[many++] = c;
+        /* What is closed comes back no faster than is left to the next step. */
+        if ((gap[c] <= 0 && !(rolls && c == a.count + b.round)) || gap[c] > most * span) continue;
+        if (!both || least_gap(i, j, &a, &b, from, span, bends, &now) <= 0) in_reach[many++] = c;
     }
     if (closed && closes_faster(i, j, &a, &b, from, 0, soft)) return from;
-    /* On what is round all corners are one candidate: when one leaves, the next may come. */
-    int rolls = b.round >= 0 && span * (fabs(W.disks[i].spin) + (j < 0 ? 0 : fabs(W.disks[j].spin))) > ROLLS;
     while (h < span && first == INFINITY && many) {
         double least = INFINITY, last = from + h;
-        for (int n = 0; n < many; n++) {
-            if (gap[in_reach[n]] > 0) least = MIN(least, gap[in_reach[n]]);
-            else if (rolls && in_reach[n] == a.count + b.round) least = 0;
-        }
+        for (int n = 0; n < many; n++) least = MIN(least, MAX(gap[in_reach[n]], 0));
         h = MIN(h + MAX(least / most, span / STRIDES), span);
         double t = h < span ? from + h : until;
         Shape a2 = shape_of(i, t), b2 = shape_of(j, t);
@@ -526,14 +572,11 @@ double meet_corners(int i, int j, double from, double until, double soft) {
             /* It may have been moved on to another's root. */
             if (j < 0) b2.s = surface_at(-1 - j, t);
             gap[c] = gap_at(&a2, &b2, near, &now);
-            int next = rolls && before <= 0 && c == a.count + b.round && closes_faster(i, j, &a2, &b2, t, 0, soft);
-            if (!(gap[c] <= 0 && (before > 0 || next))) continue;
-            double then = next ? t : root_of(i, j, &now, last, t, before, gap[c]);
-            for (double low = last, middle; next && (middle = 0.5 * (low + then)) > low && middle < then;) {
-                Shape a3 = shape_of(i, middle), b3 = shape_of(j, middle);
-                if (closes_faster(i, j, &a3, &b3, middle, 0, soft)) then = middle;
-                else low = middle;
-            }
+            if (before <= 0 && gap[c] < before && c - a.count == b.round
+                && closes_faster(i, j, &a2, &b2, t, TOUCHING * small, soft))
+                first = MIN(first, rolls_at(i, j, last, t, soft));
+            if (!(before > 0 && gap[c] <= 0)) continue;
+            double then = root_of(i, j, &now, last, t, before, gap[c]);
             if (then >= first) continue;
             Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
             if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
@@ -630,8 +673,9 @@ RARELY const Contact *place_before(const Contact *c) {
     double least = INFINITY;
     for (int k = W.disks[c->i].before; k >= 0; k = W.earlier[k].next) {
         const Contact *o = W.earlier + k;
+        if (o->j != c->j) continue;
         double off = length_of(o->spot[0] - c->spot[0], o->spot[1] - c->spot[1]);
-        if (o->j != c->j || off >= least) continue;
+        if (off >= least) continue;
         least = off;
         found = o;
     }

@@ -933,8 +933,8 @@ EXPORT int lay_out_exact(void) {
     E.knot_room = (int)many + 500;
     E.event_room = (int)many + 100;
     RESERVE(E.room, E.room_size);
-    RESERVE(E.knots, E.knot_room);
-    RESERVE(E.events, E.event_room);
+    E.knots = set_apart(E.knot_room, sizeof *E.knots);
+    E.events = set_apart(E.event_room, sizeof *E.events);
     return has_room();
 }
 

@@ -239,7 +239,7 @@ static int set_fours(int rows, int cornered, int *rolls) {
 /* Sweep over so many rows by fours, as `sweep_rows` does, up to changes of `most`; the rows have what was found, which is
    for `scale` to take up, unless the sweeps diverge. */
 double sweep_fours(int rows, int all_bodies, int cornered, int sweeps, int plain, double accurate, double most) {
-    int rolls = cornered;
+    int rolls = 0;
     if (!set_fours(rows, cornered, &rolls)) return INFINITY;
     bodies = all_bodies;
     for (int n = 0; n < bodies; n++) {
@@ -247,7 +247,7 @@ double sweep_fours(int rows, int all_bodies, int cornered, int sweeps, int plain
         W.light_bodies[n] = (LightBody){.x = (float)b->x, .y = (float)b->y, .rim = (float)b->rim};
     }
     double worst;
-    if (cornered) worst = sweep(sweeps, plain, accurate, most, 1, 1);
+    if (cornered) worst = rolls ? sweep(sweeps, plain, accurate, most, 1, 1) : sweep(sweeps, plain, accurate, most, 0, 1);
     else worst = rolls ? sweep(sweeps, plain, accurate, most, 1, 0) : sweep(sweeps, plain, accurate, most, 0, 0);
     for (SolverRow *r = W.rows; r < W.rows + rows && worst < INFINITY; r++) {
         const SolverFour *f = W.fours + r->four / 4;

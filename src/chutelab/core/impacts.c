@@ -86,8 +86,9 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     /* Surfaces do not give way: with them it grows only if jams do not help. */
     int many = sunk ? STUCK : surface >= 0 ? 2 * JAM : MANY;
     if (impacts <= many) return least;
-    double most = skip * (MOST_SKIP / SKIP) * pow(GROW, MIN(MAX(impacts - STUCK, 0), 1000));
-    return MAX(least, MIN(skip * pow(GROW, MIN(impacts - many, 1000)), most));
+    double most = skip * (MOST_SKIP / SKIP) * (impacts > STUCK ? pow(GROW, MIN(impacts - STUCK, 1000)) : 1);
+    for (int n = MIN(impacts - many, 1000); n > 0 && skip < most; n--) skip *= GROW;
+    return MAX(least, MIN(skip, most));
 }
 
 /* The same of two disks of a crowd at t: of those that rest on something also what is late, see LATE. */
@@ -182,8 +183,12 @@ void foresee(int i) {
     else if (d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs)))
         foresee_surfaces(i, &due, &partner);
     if (d->mode == FREE) {
-        for (int link = W.later_count < 0 ? -1 : d->nears; link >= 0; link = W.near_links[link])
-            if (is_live(W.disks + W.near[link ^ 1])) foresee_pair(i, W.near[link ^ 1], &due, &partner);
+        for (int link = W.later_count < 0 ? -1 : d->nears; link >= 0; link = W.near_links[link]) {
+            int j = W.near[link ^ 1];
+            /* Of two that the shock has moved the one that comes last looks. */
+            if (!is_live(W.disks + j) || (is_cornered(i, j) && W.disks[j].moved == W.shocks)) continue;
+            foresee_pair(i, j, &due, &partner);
+        }
         int n = W.later_count < 0 ? reachable(i) : 0;
         for (int k = 0; k < n; k++) foresee_pair(i, W.found[k], &due, &partner);
     }
@@ -723,6 +728,7 @@ void shock(int i, int j, double t) {
     if (!W.interact) W.step_end = t;
     for (int k = 0; k < W.moved_count; k++) {
         int m = W.moved[k];
+        W.disks[m].moved = 0;
         if (W.disks[m].mode == FREE) {
             enter_again(m, W.step_end);
             if (W.woken) list_again(m);

@@ -14,7 +14,7 @@ static double used;
 
 EXPORT Room *room(void) { return &R; }
 
-void *reserve(double count, unsigned size) {
+void *set_apart(double count, unsigned size) {
     double bytes = size * count, have = PAGE * __builtin_wasm_memory_size(0);
     double begin = R.end > 0.0 ? R.end : (double)(unsigned long)&__heap_base;
     begin = 16.0 * (double)(unsigned long)((begin + 15.0) / 16.0);
@@ -24,10 +24,16 @@ void *reserve(double count, unsigned size) {
         R.lacks = 1;
         return 0;
     }
-    void *place = (void *)(unsigned long)begin;
-    if (begin < used) memset(place, 0, (unsigned long)((used < to ? used : to) - begin));
     used = used > to ? used : to;
     R.end = to;
+    return (void *)(unsigned long)begin;
+}
+
+void *reserve(double count, unsigned size) {
+    double before = used;
+    void *place = set_apart(count, size);
+    double begin = (double)(unsigned long)place;
+    if (place && begin < before) memset(place, 0, (unsigned long)((before < R.end ? before : R.end) - begin));
     return place;
 }
 

@@ -8,6 +8,9 @@
 /* Set bytes apart, all zero, for so many rows; NULL if there are none to be had. */
 __attribute__((noinline)) void *reserve(double count, unsigned size);
 
+/* The same, of any bytes: for what is written before it is read. */
+__attribute__((noinline)) void *set_apart(double count, unsigned size);
+
 /* Have an array of `had` rows, of which `count` are in use, go on elsewhere with twice as many. */
 void *stretch(const void *rows, int count, int had, unsigned size);
 

@@ -119,8 +119,8 @@ static int judge_exact(void) {
 /* As `follow_all`; a run that is over, and of which all is still there, is judged. */
 EXPORT int follow_and_judge(void) {
     int course = follow_all(room()->budget);
-    if (course != FINISHED) return course;
-    if (exact()->is_whole && !judge_exact()) return NO_MEMORY;
+    if (course != FINISHED || !exact()->is_whole) return course;
+    if (!judge_exact()) return NO_MEMORY;
     end_events(exact()->events, exact()->event_count);
     return course;
 }
@@ -170,8 +170,8 @@ static int judge_world(void) {
 EXPORT int run_and_judge(void) {
     int status = run(room()->budget);
     const World *w = world();
-    if (status != DONE) return status;
-    if (w->is_whole && !w->interact && !judge_world()) return LACKING;
+    if (status != DONE || !w->is_whole) return status;
+    if (!w->interact && !judge_world()) return LACKING;
     end_events(w->events, w->event_count);
     return status;
 }

@@ -29,6 +29,9 @@
 #define FINE_FEW 1e-11
 /* ... and over many, of those of disks: a pile of boxes hangs together by more, and else does not come to rest. */
 #define CROWD_CORNERS 0.3
+/* ... and the share of their sweeps that it gets while something in it stirs: what others would do, the next step does
+   as well. */
+#define FEWER 0.5
 /* Share of its bound up to which friction is not all used: it holds. */
 #define HOLDS 0.999
 
@@ -254,7 +257,7 @@ void solve_contacts(int again) {
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
         double least = INFINITY, heaviest = 0;
-        int driven = 0, cornered = 0, tied = 0;
+        int driven = 0, cornered = 0, tied = 0, stirred = 0;
         W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
@@ -265,6 +268,7 @@ void solve_contacts(int again) {
             W.swings_too |= c->hung > 0;
             cornered |= c->cornered;
             tied |= is_tied(c->i) || is_tied(c->j);
+            stirred |= (a->supports && a->rest == 0) || (b->supports && b->rest == 0);
         }
         swings |= W.swings_too;
         /* A drive presses as hard as it must: there no spring would hold, so that it gives no more than
@@ -274,10 +278,14 @@ void solve_contacts(int again) {
             if (!driven) W.contacts[n].parts = INFINITY;
         }
         double accurate = W.accurate;
+        int sweeps = W.sweeps;
         if ((cornered || tied) && to - from <= FEW_CONTACTS) accurate = FINE_FEW * W.pace;
-        else if (cornered) accurate = CROWD_CORNERS * accurate;
+        else if (cornered) {
+            accurate = CROWD_CORNERS * accurate;
+            if (stirred) sweeps = (int)(FEWER * sweeps);
+        }
         if (W.interact)
-            sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), W.sweeps,
+            sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), sweeps,
                            PLAIN, accurate, W.skip * least);
         else solve_alone(list, to - from);
     }

@@ -127,7 +127,7 @@ class Recorder:
             self._angles.append(np.broadcast_to(np.asarray(angle, dtype=float), len(knots)).copy())
 
     def take_events(self, packed: NDArray[np.uint8]) -> None:
-        """Add events as the core hands them over: the bytes of rows of `EVENT`."""
+        """Add events as the core hands them over: the bytes of rows of `EVENT`, kept no longer."""
         self._events.append(packed.view(EVENT))
 
     def take_totals(self, rows: NDArray[Any]) -> None:
@@ -217,6 +217,7 @@ class Recorder:
                 angle = np.insert(angle, offsets[lonely], angle[offsets[lonely]])
             knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])
             np.cumsum(np.where(sizes == 1, 2, sizes), out=offsets[1:])
+        one = len(self._events) == 1
         events = _joined(self._events, EVENT)
         t = events["t"]
         if count > 1 or np.count_nonzero(t[1:] < t[:-1]):
@@ -225,6 +226,9 @@ class Recorder:
             in_turn = not np.count_nonzero(particle[1:] < particle[:-1])
             order = t.argsort(kind="stable") if in_turn else np.lexsort((particle, t))
             events = events.take(order)
+        elif one:
+            # It may lie in the core.
+            events = events.copy()
         if self._turned:
             knots, frame = knots.copy(), self.machine.frame
             for rows in (knots, events, *[self.impulses][: self.impulses.size]):

@@ -353,7 +353,15 @@ def _blocks(nodes: Iterable[SyntaxTreeNode], asked: Sequence[SyntaxTreeNode]) ->
             case "math_block":
                 made.append(f"$ {typeset(parsed(node.content))} $")
             case "table":
-                made.append(_table(node))
+                rows = [[_inline(cell) for cell in row.children]
+                        for part in node.children for row in part.children]  # fmt: skip
+                blank = [not all(cells) for cells in zip(*rows[1:], strict=True)]
+                # Columns with cells to be filled in share the free width.
+                columns = ", ".join("1fr" if one else "auto" for one in blank)
+                head, *body = ("".join(f"[{cell or '#blank'}]" for cell in row) for row in rows)
+                table = f"#table(columns: ({columns},), table.header{head}){''.join(body)}"
+                # A table that is filled in by hand stays on one page.
+                made.append(f"#block(breakable: false)[{table}]" if any(blank) else table)
             case "hr":
                 made.append("#line(length: 100%)")
             case "blockquote":
@@ -361,19 +369,6 @@ def _blocks(nodes: Iterable[SyntaxTreeNode], asked: Sequence[SyntaxTreeNode]) ->
             case _:
                 made.append(f"{_inline(node)}{'#room' * (node in asked)}")
     return "\n\n".join(made)
-
-
-def _table(table: SyntaxTreeNode) -> str:
-    """Return a table; columns with cells to be filled in share the free width."""
-    rows = [
-        [_inline(cell) for cell in row.children] for part in table.children for row in part.children
-    ]
-    blank = [not all(cells) for cells in zip(*rows[1:], strict=True)]
-    columns = ", ".join("1fr" if one else "auto" for one in blank)
-    head, *body = ("".join(f"[{cell or '#blank'}]" for cell in row) for row in rows)
-    made = f"#table(columns: ({columns},), table.header{head}){''.join(body)}"
-    # A table that is filled in by hand stays on one page.
-    return f"#block(breakable: false)[{made}]" if any(blank) else made
 
 
 def _inline(node: SyntaxTreeNode) -> str:

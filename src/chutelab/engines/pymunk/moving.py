@@ -22,7 +22,7 @@ from chutelab.machine import Joint, Machine, Mover
 from chutelab.util.arrays import Bools, Floats, Ints
 
 COMES_BACK: Final = 0.02
-"""s; in which what has gone beyond a stop within a step comes back to it, but for 1/e."""
+"""s; in which what has gone beyond a stop within a step, or is stretched, is back, but for 1/e."""
 
 SWEEPS: Final = 10
 """Iterations of Chipmunk for each face that hangs on a hinge with others: each turns with the first
@@ -214,18 +214,14 @@ class Moving:
         return np.asarray(self.velocity[:, rows] + np.stack([-turn * y, turn * x], axis=1))
 
 
-LEFT = 0.9
-"""Share that is left, a step later, of what a string was stretched by when it was pulled tight."""
-
-
 @dataclass
 class Tie:
-    """A joint of the Space; of a string, `over` (m) is what it is still stretched by."""
+    """A joint of the Space; `over` (m) is what it is stretched by, None before its first step."""
 
     joint: Joint
     held: Any
     spring: Floats  # a row of `Record.springs`
-    over: float = 0.0
+    over: Any = None
     tied: bool = False
 
     def ends(self, positions: Floats) -> tuple[Vec2d, Vec2d]:
@@ -249,13 +245,13 @@ class Ties:
         self.space, self.rounding, self.all = world.space, world.rounding, list[Tie]()
         self.free = np.zeros(machine.count, dtype=bool)
         for joint in machine.joints:
-            held = self._held(joint, bodies, machine.releases.position)
+            held = self._held(joint, bodies, machine)
             held.error_bias = 0.0
             held.collide_bodies = joint.kind not in ("rod", "pin")
             self.all.append(Tie(joint, held, np.zeros(4)))
         self.springs = [tie.spring for tie in self.all if tie.joint.kind == "spring"]
 
-    def _held(self, joint: Joint, bodies: list[pymunk.Body], places: Floats) -> Any:
+    def _held(self, joint: Joint, bodies: list[pymunk.Body], machine: Machine) -> Any:
         far = self.space.static_body if joint.other < 0 else bodies[joint.other]
         own, anchor = bodies[joint.particle], joint.anchor or (0.0, 0.0)
         if joint.kind == "string":
@@ -267,10 +263,14 @@ class Ties:
             rod = pymunk.PinJoint(far, own, anchor, (0.0, 0.0))
             rod.distance = joint.length
             return rod
-        arm = tuple((np.array(anchor) - places[joint.particle]).tolist())
-        if joint.other >= 0:
-            anchor = tuple((np.array(anchor) - places[joint.other]).tolist())
-        return pymunk.PivotJoint(far, own, anchor, arm)
+
+        def on(i: int) -> Vec2d:
+            """Return where it is pinned as that particle has it, which is released turned."""
+            off = np.array(anchor) - machine.releases.position[i]
+            return Vec2d(*off.tolist()).rotated(-float(machine.releases.angle[i]))
+
+        there = on(joint.other) if joint.other >= 0 else anchor
+        return pymunk.PivotJoint(far, own, there, on(joint.particle))
 
     def put(self, i: int, *, free: bool) -> None:
         """Tie what a particle has, or take it away: what has two is tied once both fly."""
@@ -282,30 +282,46 @@ class Ties:
             flies = bool(self.free[joint.particle] and (joint.other < 0 or self.free[joint.other]))
             if flies != tie.tied:
                 (self.space.add if flies else self.space.remove)(tie.held)
+                tie.over = None
             tie.tied = flies
 
     def tighten(self, h: float) -> None:
-        """Set the lengths of strings for the next step.
+        """Set the lengths of joints for the next step.
+
+        What is tied, or a string that is pulled tight, is by up to a step beyond what it can be.
+        That is taken back slowly: at once it would throw back what hangs on it.
 
         Chipmunk lets a string go that is not longer than its length: one that pulls is kept longer
-        by rounding. One that is pulled tight has overshot by up to a step; that is taken back
-        slowly, or what hangs on it would be thrown back.
+        by rounding.
         """
+        left = exp(-h / COMES_BACK)
         for tie in self.all:
-            if not tie.tied or tie.joint.kind != "string":
+            held, kind, whole = tie.held, tie.joint.kind, tie.joint.length
+            if not tie.tied or kind == "spring":
                 continue
-            held, whole = tie.held, tie.joint.length
-            ahead = held.b.position + h * held.b.velocity
-            far = held.anchor_a if tie.joint.other < 0 else held.a.position + h * held.a.velocity
-            length = (ahead - far).length
-            if held.impulse > 0.0:
-                tie.over *= LEFT
+            far, own = (
+                body.position + h * body.velocity
+                + anchor.rotated(body.angle + h * body.angular_velocity)
+                for body, anchor in ((held.a, held.anchor_a), (held.b, held.anchor_b))
+            )  # fmt: skip
+            length = (own - far).length
+            if kind == "pin":
+                if tie.over is None:
+                    more = (own - far).rotated(-held.a.angle - h * held.a.angular_velocity)
+                    tie.over = Vec2d.zero()
+                else:
+                    more = (left - 1.0) * tie.over
+                tie.over += more
+                held.anchor_a += more
+            elif kind == "rod":
+                tie.over = length - whole if tie.over is None else left * tie.over
+                held.distance = whole + tie.over
             else:
-                tie.over = max(length - whole, 0.0)
-            held.max = whole + tie.over
-            rounding = max(self.rounding, DIGITS * whole)
-            if length > whole - rounding:
-                held.max = min(held.max, length - rounding)
+                tie.over = left * tie.over if held.impulse > 0.0 else max(length - whole, 0.0)
+                held.max = whole + tie.over
+                rounding = max(self.rounding, DIGITS * whole)
+                if length > whole - rounding:
+                    held.max = min(held.max, length - rounding)
 
     def pulled(self, state: Floats, pull: Vec2d, h: float) -> list[tuple[Tie, Floats]]:
         """Return what each joint did in the last step to the ledger: entries of the particles, J.

@@ -28,9 +28,10 @@ ROUND = 3e-3
 two faces lie on each other Chipmunk tells from a distance above 0 between what is not rounded; at
 0 its normal may be anything."""
 
-FACES = 30
+FACES, JOINED = 30, 100
 """Iterations of Chipmunk's solver where particles have corners: the two points of a face share
-a blow to 1e-11. Its default, 10, which is right for disks, leaves 1e-4."""
+a blow to 1e-11. Its default, 10, which is right for disks, leaves 1e-4. A blow between two on pins
+is right to 1e-2 by 30, to rounding by 100."""
 
 ROLLER = 3
 """Collision type of the ends of moving segments."""
@@ -118,7 +119,7 @@ class Shapes:
         if self.table is not None:
             space.on_collision(PARTICLE, PARTICLE, pre_solve=self._met)
         if self.corners:
-            space.iterations = FACES
+            space.iterations = JOINED if machine.joints else FACES
         for kind in (PARTICLE, SURFACE, ROLLER) if self.corners else ():
             space.on_collision(PARTICLE, kind, post_solve=self._note)
 
@@ -204,9 +205,11 @@ class Shapes:
             return [shape]
         if face.speed == 0.0:
             return [shape]
-        # With neighbours in line Chipmunk finds no contact beyond the segment's ends.
-        a, b = face.ends
-        shape.set_neighbors(a - (b - a), b + (b - a))
+        if not self.corners:
+            # With neighbours in line Chipmunk finds no contact beyond the segment's ends, nor of
+            # what lies flat on one by an edge, as rounding will have it.
+            a, b = face.ends
+            shape.set_neighbors(a - (b - a), b + (b - a))
         assert face.tangent is not None
         shape.surface_velocity = face.speed * face.tangent
         rollers = [pymunk.Circle(shape.body, 0.0, end) for end in face.ends]

@@ -41,7 +41,7 @@ typedef struct {
     double end;             /* where the next array begins; 0: at the beginning */
     int lacks;              /* whether there was too little */
     int budget;             /* [in] rounds, or steps, after which a run comes back at the latest */
-    int packed;             /* [out] bytes of the events of a run that is over, see `pack_events`; 0 of others */
+    int packed;             /* [out] bytes of the events of a run that is over and whole, see `pack_events`; else 0 */
 } Room;
 
 /* What every step asks of every disk stands first, in few lines of the processor's cache. */

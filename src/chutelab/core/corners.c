@@ -553,20 +553,17 @@ double meet_corners(int i, int j, double from, double until, double soft) {
         if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c, near);
         gap[c] = gap_at(&a, &b, near, &now);
         closed |= gap[c] <= 0;
-<<<<<<< HEAD
-        /* What is closed comes back no faster than is left to the next step. */
-        if ((gap[c] <= 0 && !(rolls && c == a.count + b.round)) || gap[c] > most * span) continue;
-        if (!both || least_gap(i, j, &a, &b, from, span, bends, &now) <= 0) in_reach[many++] = c;
-=======
         if (gap[c] > most * span) continue;
         /* What is closed to another polygon comes back no faster than is left to the next step; a surface may turn. */
         if (!both || (gap[c] > 0 && least_gap(i, j, &a, &b, from, span, bends, &now) <= 0)) in_reach[many++] = c;
->>>>>>> main
     }
     if (closed && closes_faster(i, j, &a, &b, from, 0, soft)) return from;
     while (h < span && first == INFINITY && many) {
         double least = INFINITY, last = from + h;
-        for (int n = 0; n < many; n++) least = MIN(least, MAX(gap[in_reach[n]], 0));
+        for (int n = 0; n < many; n++) {
+            if (gap[in_reach[n]] > 0) least = MIN(least, gap[in_reach[n]]);
+            else if (rolls && in_reach[n] == a.count + b.round) least = 0;
+        }
         h = MIN(h + MAX(least / most, span / STRIDES), span);
         double t = h < span ? from + h : until;
         Shape a2 = shape_of(i, t), b2 = shape_of(j, t);

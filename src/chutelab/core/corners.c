@@ -12,6 +12,8 @@
 /* Strides of a span in which gaps are looked at, at least: a touch that comes and goes within one is left to the
    next step. */
 #define STRIDES 8
+/* rad; what turns by more in a span may leave something round by one corner and meet it by the next. */
+#define ROLLS 0.05
 /* Halvings to the instant of a blow, to its last bit. */
 #define TO_ROOT 200
 /* ... and quicker steps before them. */
@@ -232,16 +234,17 @@ static void fill_in(const Shape *a, const Shape *b, Touch *t) {
 }
 
 /* The side of a segment that a corner is on: its own. Where the line from it to the centre, which is inside the shape,
-   crosses the segment, it has sunk through, and is on the side of the centre; so it is `near` its ends, too: what has
-   sunk into two walls is beyond the end of each. */
+   crosses the segment, it has sunk through, and is on the side of the centre; so it is `near` an end where another goes
+   on to that side: what has sunk into two walls is beyond the end of each. */
 static int side_of(const Shape *a, const Surface *s, int corner, double near) {
     double x = a->p[corner][0] - s->x, y = a->p[corner][1] - s->y, u = a->x - s->x, v = a->y - s->y;
     double off = y * s->tx - x * s->ty, mid = v * s->tx - u * s->ty, both = fabs(off) + fabs(mid);
-    double over = fabs(off) <= near ? near : 0;
     int own = off >= 0 ? 1 : -1, centre = mid >= 0 ? 1 : -1;
     if (own == centre) return own;
     double cut = ((x * s->tx + y * s->ty) * fabs(mid) + (u * s->tx + v * s->ty) * fabs(off)) / both;
-    return cut >= -over && cut <= s->length + over ? centre : own;
+    int hollow = centre > 0 ? 1 : 2, sunk = fabs(off) <= near;
+    double low = sunk && (s->hollows[0] & hollow) ? -near : 0, high = sunk && (s->hollows[1] & hollow) ? near : 0;
+    return cut >= low && cut <= s->length + high ? centre : own;
 }
 
 /* Whether a corner is inside the circle of an arc: on its own, or by the centre where the line to it, inside the shape,
@@ -542,6 +545,8 @@ double meet_corners(int i, int j, double from, double until, double soft) {
     double turn = both ? fabs(W.disks[i].spin) + fabs(W.disks[j].spin) : 0;
     double bends = turn * (2 * most + 4 * turn * MAX(W.disks[i].radius, both ? W.disks[j].radius : 0));
     if (are_apart(&a, &b, most * span + near)) return INFINITY;
+    /* On what is round all corners are one candidate: when one leaves, the next may come. */
+    int rolls = b.round >= 0 && span * (fabs(W.disks[i].spin) + (j < 0 ? 0 : fabs(W.disks[j].spin))) > ROLLS;
     for (int c = 0; c < count; c++) {
         Touch now = {.which = c};
         /* The side that it is on does not change within a step. */
@@ -555,8 +560,10 @@ double meet_corners(int i, int j, double from, double until, double soft) {
     if (closed && closes_faster(i, j, &a, &b, from, 0, soft)) return from;
     while (h < span && first == INFINITY && many) {
         double least = INFINITY, last = from + h;
-        for (int n = 0; n < many; n++)
+        for (int n = 0; n < many; n++) {
             if (gap[in_reach[n]] > 0) least = MIN(least, gap[in_reach[n]]);
+            else if (rolls && in_reach[n] == a.count + b.round) least = 0;
+        }
         h = MIN(h + MAX(least / most, span / STRIDES), span);
         double t = h < span ? from + h : until;
         Shape a2 = shape_of(i, t), b2 = shape_of(j, t);

@@ -156,6 +156,7 @@ typedef struct {
     int chain;              /* the next of the pieces that share its column: they go on at its ends */
     int there;              /* whether it is there in this step; LEAVING: until just now */
     int mover;              /* row of `movers` if it moves, else -1 */
+    int hollows[2];         /* of a segment: sides towards which another goes on from its ends: 1 left, 2 right */
     double box[4];          /* m; left, bottom, right, top; of all that it sweeps in this step */
     double swept[4];        /* m; the same of the whole run */
     double posed;           /* s; of what moves: when its place is as above ... */

@@ -58,6 +58,8 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 #define JAM_SWEEPS 2000
 /* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
 #define REST 2.5e-3
+/* m/s2; gravity for which bounds on speeds and times are written: others have `W.pace` of them. */
+#define EARTH 9.81
 /* s on Earth; so long an island has to be at rest. */
 #define CALM_DOWN 0.05
 /* Of the speed; a slower approach grazes, and rounding may well have made it. */

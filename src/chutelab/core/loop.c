@@ -365,13 +365,13 @@ static void set_step(double h) {
 }
 
 /* Longest step in which what touches the insides of arcs in a crowd does not hop too far, and a corner, whose gap is
-   bent by what turns, in this step of a length h, no faster than weight makes it, s. */
+   bent by what turns, in this step of a length h, no faster than weight makes it, without gravity weight on Earth, s. */
 static double bent_step(double h) {
-    double most = INFINITY, press = W.g + W.haste, u[3];
+    double most = INFINITY, press = (W.g > 0 ? W.g : EARTH) + W.haste, u[3];
     for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
         const Disk *d = W.disks + c->i;
         if (c->turns > 0) most = MIN(most, hop_time(d, W.g + c->turns));
-        if (!c->cornered || press == 0) continue;
+        if (!c->cornered) continue;
         relative(c, 1, u);
         double bends = 2 * (c->gap + u[0] * h - c->free_gap) / (h * h);
         most = MIN(most, MAX(hop_time(d, press) * press / MAX(bends, press), SHORTEST * W.usual));

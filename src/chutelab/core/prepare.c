@@ -12,9 +12,6 @@
 #define JOINED 1e-3
 #define SMOOTH 1e-2
 
-/* m/s2; gravity for which bounds on speeds and times are written: others have `W.pace` of them. */
-#define EARTH 9.81
-
 /* Most sweeps of the contact solver in a step: with 60 a pile of 2,000 hardly comes to rest. */
 #define SWEEPS 100
 #define SWEEPS_ALONE 500

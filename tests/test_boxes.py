@@ -346,6 +346,27 @@ def test_auto_takes_the_contact_engine_for_boxes():
     assert simulation.choose(build(chutelab.load("dominoes"))) == "contact"
 
 
+def test_a_box_that_lies_over_the_end_of_an_arc_is_on_its_inside_with_the_corner_in_it():
+    """Its centre has left the circle then. Nothing gives energy: what is lost stays lost."""
+    step = 2e-4
+    run = chutelab.simulate({
+        "particle": {"shape": "box", "size": [0.07705265544402617, 0.015410531088805236],
+                     "mass": 0.01, "spin": True},
+        "surface": [{"name": "bowl", "center": [-0.7375967737249944, -0.35],
+                     "radius": 0.08879624971305165, "from_deg": 234.23342208729576,
+                     "to_deg": 331.80760496383243, "friction": 0.0, "restitution": 0.0,
+                     "hinge": [-0.8711225082101356, -0.40420379797038586], "mass": 1.0,
+                     "spring": 3.6465009803206145, "damper": 0.07969766316292792}],
+        "stream": {"at": [-0.75, 0.1222183804443886], "to": [-0.75, 0.6422183804443886],
+                   "count": 1, "interact": True, "friction": 0.2,
+                   "restitution": 0.06993067616040616,
+                   "velocity": [-0.15598830904689298, -0.5433514644421094]},
+        "run": {"until": 0.52, "dt": step, "engine": "contact"},
+    })  # fmt: skip
+    lost = run.energy_at(np.arange(0.2, 0.519, step))
+    assert np.diff(lost["restitution_loss"]).min() > -1e-7
+
+
 # What is left, some 1e-4 J, the run tells.
 @pytest.mark.filterwarnings("ignore:LAW BROKEN, no loss is negative")
 @pytest.mark.parametrize(("omega", "angle"), [(-40.0, 36.0), (0.0, 63.0), (40.0, 45.0)])

@@ -247,10 +247,10 @@ static int side_of(const Shape *a, const Surface *s, int corner, double near) {
     return cut >= low && cut <= s->length + high ? centre : own;
 }
 
-/* Whether a corner is inside the circle of an arc: on its own, or by the centre where the line to it, inside the shape,
-   crosses the arc. */
-static int is_inside(const Shape *a, const Surface *s, int corner) {
-    double x = a->p[corner][0] - s->x, y = a->p[corner][1] - s->y, u = a->x - s->x, v = a->y - s->y;
+/* Whether a point of a shape is inside the circle of an arc: on its own, or by the centre where the line to it, inside
+   the shape, crosses the arc. */
+static int is_inside(const Shape *a, const Surface *s, double px, double py) {
+    double x = px - s->x, y = py - s->y, u = a->x - s->x, v = a->y - s->y;
     double off = x * x + y * y - square(s->radius);
     int own = off <= 0, centre = u * u + v * v < square(s->radius);
     if (own == centre) return own;
@@ -281,7 +281,7 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
             double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);
             t->on = 0;
             fill_in(a, b, t);
-            if (!is_inside(a, b->s, t->which)) return 0;
+            if (!is_inside(a, b->s, q[0], q[1])) return 0;
             return b->s->shape == CIRCLE || x * b->s->tx + y * b->s->ty >= b->s->cos_half * d;
         }
         if (b->round >= 0) {
@@ -314,8 +314,7 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
     }
     fill_in(a, b, t);
     if (!b->s) return 1;
-    double x = a->x - b->s->x, y = a->y - b->s->y;
-    if (x * x + y * y < b->radius * b->radius) return 0;
+    if (is_inside(a, b->s, t->x + t->gap * t->nx, t->y + t->gap * t->ny)) return 0;
     return b->s->shape == CIRCLE || t->nx * b->s->tx + t->ny * b->s->ty >= b->s->cos_half;
 }
 

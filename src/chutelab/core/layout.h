@@ -42,6 +42,7 @@ typedef struct {
     int lacks;              /* whether there was too little */
     int budget;             /* [in] rounds, or steps, after which a run comes back at the latest */
     int packed;             /* [out] bytes of the events of a run that is over and whole, see `pack_events`; else 0 */
+    int first;              /* [out] where the first array begins */
 } Room;
 
 /* What every step asks of every disk stands first, in few lines of the processor's cache. */

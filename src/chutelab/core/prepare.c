@@ -316,9 +316,9 @@ static int lay_out_work(void) {
     W.swing_room = W.hinges ? 1024 + 8 * W.mover_count : 0;
     RESERVE(W.swings, W.swing_room);
     RESERVE(W.swing_work, 3.0 * W.swing_room);
-    RESERVE(W.knots, W.knot_room);
+    W.knots = set_apart(W.knot_room, sizeof *W.knots);
     RESERVE(W.totals, W.total_room);
-    RESERVE(W.events, W.event_room);
+    W.events = set_apart(W.event_room, sizeof *W.events);
     make_contact_room(8 * n + 16);
     make_near_room(crowd ? 16 * n + 16 : 1);
     return has_room();

@@ -345,7 +345,7 @@ class Record(Shown):
     def __post_init__(self) -> None:
         for value in vars(self).values():
             if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+                value.setflags(write=False)
         if len(self.triggered):
             object.__setattr__(self, "machine", self.machine.when(self.triggered))
         if len(self.swings):

@@ -7,11 +7,13 @@ import pytest
 
 from chutelab.engines import contact, exact, pymunk
 from chutelab.engines.contact import run
-from chutelab.results import Kind
+from chutelab.engines.simulation import simulate
+from chutelab.results import REASONS, Kind
 from chutelab.results.laws import judge
 from chutelab.results.recorder import StalledError
 from machines import bent, face, scene_of, thrown
 from shared import some
+from test_repeats import CROWD
 
 G = 9.81
 R = 0.01
@@ -307,3 +309,16 @@ def test_a_belt_that_throws_into_a_mirror_works_without_end(engine):
     # Where a step begins, contact adds what the weight does in it.
     rtol = G * machine.dt / v if engine is contact else 1e-5
     np.testing.assert_allclose(abs(given) * v, work, rtol=rtol)
+
+
+def test_what_is_held_between_carried_disks_rattles_no_longer_than_it_helps():
+    """Round a pulley, where v² is about g ρ, those below leave first, under others that ride on.
+
+    Nothing moves what is carried, so there may be no room between two of these, or one and the belt:
+    blows would go on without end, and each cut the step to a fiftieth. What the solve of all leaves
+    open stays open to the step's end, so steps are as many as the time has, and a few.
+    """
+    slower = CROWD.with_values({"incoming.speed": 1.9})
+    recording = simulate(slower, engine="contact", max_seconds=20.0)
+    assert (recording.ended == REASONS.index("landed")).all()
+    assert recording.steps < 1.1 * recording.knots["t"].max() / slower.run.dt

@@ -78,6 +78,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     } else if (surface >= 0 && (W.interact || d->held_count))
         sunk = gap_to(surface_at(surface, d->t), d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius;
     if (sunk) least *= HARDLY;
+    least = MAX(least, d->open);
     for (int n = 0; n < d->held_count && surface >= 0 && !has_corners(d); n++) {
         if (sunk || !is_one(d, d->held[n], surface)) continue;
         double haste = hastes(surface_at(surface, d->t), d);
@@ -428,6 +429,7 @@ static void jam(Contact *struck, double t) {
         memcpy(&d->vx, v, sizeof v);
     }
     account(list, count);
+    give_in(list, count);
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);

@@ -567,9 +567,11 @@ static void strike(int i, int j, double t) {
     if (a->mode == ASLEEP) wake(i, t);
     if (j >= 0 && b->mode == ASLEEP) wake(j, t);
     advance(a, t);
-    if (!W.interact) slow_down(i, t);
-    if (j >= 0) advance(b, t);
-    else if (a->impacts < FEW) end_hop(i, t);
+    slow_down(i, t);
+    if (j >= 0) {
+        advance(b, t);
+        if (b->mode == FREE) slow_down(j, t);
+    } else if (a->impacts < FEW) end_hop(i, t);
     /* It has got clear of what let it through. */
     if (j < 0 && W.surfaces[-1 - j].one_sided) *spared_by(W.surfaces + (-1 - j), a) = 0;
     if (is_cornered(i, j)) {

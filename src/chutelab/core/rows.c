@@ -396,20 +396,28 @@ static Two slopes(double one, double other) {
 
 /* Take the share of all impulses at which the cost is least; 0 if that is all of them. The slope grows with it:
    straight from `none` to `all`, below that where what an overlap asks for ends at its most, above where it ends
-   at what keeps it as deep: there the share is halved in on. Where sweeps end, the impulses do no work so on
-   the velocities that they leave, however far the sweeps had come: W J + q times J is at most 0. */
+   at what keeps it as deep: there it is looked for between two shares, halfway and where the straight line from one to
+   the other is zero. Where sweeps end, the impulses do no work so on the velocities that they leave, however far the
+   sweeps had come: W J + q times J is at most 0. */
 int lessen(void) {
     Two ends = slopes(0, 1);
-    double none = first(ends), all = second(ends), share, less = 0;
+    double none = first(ends), all = second(ends), share = 0, from = 0, to = 1, below = none, above = all;
     if (!(all > 0)) return 0;
-    share = none < 0 ? none / (none - all) : 0;
-    if (first(slopes(share, share)) > EPS * all) {
-        for (int n = 0; n < HALVINGS; n++) {
-            double middle = 0.5 * (less + share);
-            if (first(slopes(middle, middle)) > 0) share = middle;
-            else less = middle;
+    for (int n = 0; n < HALVINGS && below < 0 && from < to; n++) {
+        double middle = 0.5 * (from + to);
+        share = from - below / (above - below) * (to - from);
+        Two at = slopes(share, middle);
+        if (first(at) <= EPS * all) break;
+        to = share;
+        above = first(at);
+        if (middle < to && second(at) <= 0) {
+            from = middle;
+            below = second(at);
+        } else if (middle < to) {
+            to = middle;
+            above = second(at);
         }
-        share = less;
+        share = from;
     }
     scale(share);
     return 1;

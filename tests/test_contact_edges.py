@@ -314,9 +314,9 @@ def test_a_belt_that_throws_into_a_mirror_works_without_end(engine):
 def test_what_is_held_between_carried_disks_rattles_no_longer_than_it_helps():
     """Round a pulley, where v² is about g ρ, those below leave first, under others that ride on.
 
-    Nothing moves what is carried, so there may be no room between two of these, or one and the belt:
-    blows would go on without end, and each cut the step to a fiftieth. What the solve of all leaves
-    open stays open to the step's end, so steps are as many as the time has, and a few.
+    Nothing moves what is carried, so there may be no room between two of these, or one and the
+    belt: blows would go on without end, and each cut the step to a fiftieth. What the solve of all
+    leaves open stays open to the step's end, so steps are as many as the time has, and a few.
     """
     slower = CROWD.with_values({"incoming.speed": 1.9})
     recording = simulate(slower, engine="contact", max_seconds=20.0)

@@ -96,9 +96,9 @@ SHORTEST = 0.05
 
 
 DRIVEN = {152: LONE, **dict.fromkeys((94, 355, 399), ("pymunk",))}
-"""Seeds at which belts drive a particle to and fro in a wedge without end, and the engines that have
-to tell. Where little is given back the contact engine, and for what does not turn the exact one, let
-the belt stall; Chipmunk has nothing of the kind."""
+"""Seeds at which belts drive a particle to and fro in a wedge without end, and the engines that
+have to tell. Where little is given back the contact engine, and for what does not turn the exact
+one, let the belt stall; Chipmunk has nothing of the kind."""
 
 
 def machine(seed):

@@ -308,6 +308,7 @@ class Recorder:
             knots = knots.copy()
             for rows in (knots, events):
                 rows["position"] += self.origin
+        if any(self.origin) and self.totals.size:
             released = offsets[1:] > offsets[:-1]
             begun = knots["t"][offsets[:-1][released]]
             order = np.argsort(begun, kind="stable")

@@ -246,10 +246,6 @@ void prepare_hinge(Mover *m);
 double hinge_step(double h);
 void bound_hinges(double t, double h);
 void begin_hinges(double t, double h);
-double turn_hinges(void);
-void start_hinges(int back);
-void lean_on_hinges(double *none, double *all);
-void lessen_hinges(double less);
 double gained_by_hinges(void);
 void leave_hinges(double t);
 double meet_stops(double t, double end);
@@ -269,7 +265,9 @@ void stop_hinges(double t);
 void go_on(void);
 
 /* hung.c */
-void sweep_hung(Contact *list, int count, int sweeps, double enough);
+SolverBody hinge_body(int k);
+int set_hinge_rows(SolverRow *rows, int body);
+void take_hinge_rows(const SolverRow *rows, int count, int body);
 
 /* hand.c */
 void kick_disks(double h);
@@ -410,6 +408,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
 void solve_contacts(int again);
 
 /* closing.c */
+void give_in(const Contact *list, int count);
 void close_step(double h);
 void take_back(int i);
 void end_in_contact(int i, int reason);

@@ -42,6 +42,7 @@ typedef struct {
     int lacks;              /* whether there was too little */
     int budget;             /* [in] rounds, or steps, after which a run comes back at the latest */
     int packed;             /* [out] bytes of the events of a run that is over and whole, see `pack_events`; else 0 */
+    int first;              /* [out] where the first array begins */
 } Room;
 
 /* What every step asks of every disk stands first, in few lines of the processor's cache. */
@@ -74,6 +75,7 @@ typedef struct {
     double since;               /* s; latest impact */
     double slept;               /* s; since when it is asleep */
     double calm;                /* s; since when nothing at its contacts slips or moves apart */
+    double open;                /* m/s; what the solve leaves open where a belt carries one of those in touch, see `give_in` */
     double rest;                /* s; since when it is at rest: the same to the finer bound of falling asleep,
                                    or it stays where it is, however it rattles there */
     double anchor[3];           /* m; where its rest began: x, y, and how far its rim has turned since */
@@ -384,12 +386,12 @@ typedef struct {
     double *swing_work;  /* (swings, 3), J; `stopped`, `damped` and `pushed` of its mover then */
     Contact *contacts;   /* of this step */
     Contact *earlier;    /* of the step before */
-    SolverRow *rows;     /* (contacts) of those that are solved together */
-    RowLever *levers;    /* (contacts) ... of particles with corners */
-    SolverBody *solver_bodies; /* (disks + 1) ... and their disks */
+    SolverRow *rows;     /* (contacts + 3 movers) of those that are solved together */
+    RowLever *levers;    /* (contacts + 3 movers) ... of particles with corners, and hinges */
+    SolverBody *solver_bodies; /* (disks + 1 + movers) ... and their disks, and hinges */
     SolverFour *fours;   /* (four_room) the same in single precision */
     LeverFour *lever_fours; /* (four_room) ... and their levers */
-    LightBody *light_bodies; /* (disks + 1) */
+    LightBody *light_bodies; /* (disks + 1 + movers) */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */
     int *near_links;     /* (2 near) the next place in `near` of the same disk, or -1 */

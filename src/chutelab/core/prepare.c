@@ -259,11 +259,11 @@ static void make_contact_room(int room) {
     RESERVE(W.contacts, room);
     RESERVE(W.earlier, room);
     RESERVE(W.links, 2.0 * room);
-    RESERVE(W.rows, room);
-    RESERVE(W.levers, W.outline_count ? room : 0);
+    RESERVE(W.rows, room + 3.0 * W.mover_count);
+    RESERVE(W.levers, W.outline_count || W.mover_count ? room + 3.0 * W.mover_count : 0);
     W.four_room = W.interact ? room / 4 : 0;
     RESERVE(W.fours, W.four_room);
-    RESERVE(W.lever_fours, W.outline_count ? W.four_room : 0);
+    RESERVE(W.lever_fours, W.outline_count || W.mover_count ? W.four_room : 0);
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
 }
 
@@ -291,10 +291,10 @@ static int lay_out_work(void) {
     for (W.bucket_count = 1; crowd && W.bucket_count <= 4 * n + 16;) W.bucket_count *= 2;
     W.cell_room = crowd ? 12 * n + 64 : 1;
     RESERVE(W.tracks, n);
-    RESERVE(W.solver_bodies, n + 1.0);
+    RESERVE(W.solver_bodies, n + 1.0 + W.mover_count);
     RESERVE(W.edges, 3.0 * W.outline_count);
     RESERVE(W.poses, W.outline_count ? 6.0 * n : 0);
-    RESERVE(W.light_bodies, n + 1.0);
+    RESERVE(W.light_bodies, n + 1.0 + W.mover_count);
     RESERVE(W.joint_rows, W.joint_row_count);
     RESERVE(W.joint_matrix, (double)W.joint_row_count * W.joint_row_count);
     RESERVE(W.waits, crowd ? (double)WAITS * n : WAITS);
@@ -316,9 +316,9 @@ static int lay_out_work(void) {
     W.swing_room = W.hinges ? 1024 + 8 * W.mover_count : 0;
     RESERVE(W.swings, W.swing_room);
     RESERVE(W.swing_work, 3.0 * W.swing_room);
-    RESERVE(W.knots, W.knot_room);
+    W.knots = set_apart(W.knot_room, sizeof *W.knots);
     RESERVE(W.totals, W.total_room);
-    RESERVE(W.events, W.event_room);
+    W.events = set_apart(W.event_room, sizeof *W.events);
     make_contact_room(8 * n + 16);
     make_near_room(crowd ? 16 * n + 16 : 1);
     return has_room();

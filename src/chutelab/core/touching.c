@@ -138,6 +138,11 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     c->need = (aim - later) / h;
     c->parts = (aim - closed) / h;
     c->drift = 0.5 * h * c->pull;
+    if (cornered && W.g == 0) {
+        /* Without weight nothing hops by more than it fell: what it would begin with is given by nothing. */
+        c->need = MIN(c->need, c->parts + MAX(-2 * u[0], 0));
+        c->drift = MIN(MAX(c->drift, -fabs(u[1])), fabs(u[1]));
+    }
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     for (int n = 0; n < 3 && last; n++) c->impulse[n] = W.again * last->impulse[n];
     int was_pressed = c->impulse[0] > 0 || is_held(d, -1 - j);

@@ -163,8 +163,9 @@ def hand_over(module: Module, scene: Scene) -> None:
     plan = module.structs["Plan"]
     for name, size in sizes.items():
         setattr(plan, name, size)
-    module.work("lay_out_plan")
-    module.fill("Plan", rows=numbers)
+    if not module.begin_with(numbers):
+        module.work("lay_out_plan")
+        module.fill("Plan", rows=numbers)
 
 
 def lay(

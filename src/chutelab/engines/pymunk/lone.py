@@ -181,14 +181,10 @@ class Lone:
             rounds += 1
             if self.t - begin >= GAINED * self.dt:
                 begin, done, rounds = self.t, self.steps, 0
-            elif self.steps - done + rounds > WINDOW and not self.ended:
-                self._end("time")
-                raise StalledError(
-                    self.particle, self.t, (self.x.x, self.x.y),
-                    f"{WINDOW} steps gain less than {GAINED} times run.dt: it goes to and fro, or"
-                    " round, in a narrow place; move the surfaces there apart, lower their"
-                    " restitution, or take another engine",
-                )  # fmt: skip
+            elif self.blows > 2 * TURNS:
+                self._stall("its blows never end")
+            elif self.steps - done + rounds > WINDOW:
+                self._stall(f"{WINDOW} steps gain less than {GAINED} times run.dt")
         self.world.space.remove(self.body, self.circle)
         self._look()
 
@@ -202,6 +198,17 @@ class Lone:
             if not self.ended:
                 self._end("stopped")
             raise
+
+    def _stall(self, why: str) -> None:
+        """Raise a `StalledError`, unless the track has ended."""
+        if self.ended:
+            return
+        self._end("time")
+        raise StalledError(
+            self.particle, self.t, (self.x.x, self.x.y),
+            f"{why}: it goes to and fro, or round, in a narrow place; move the surfaces there"
+            " apart, lower their restitution, or take another engine",
+        )  # fmt: skip
 
     # Chipmunk
 

@@ -166,8 +166,8 @@ class Lone:
                 ahead = (t for face in every for t in (face.appears, face.vanishes))
                 self.changes = min(t for t in (*ahead, inf) if t > self.t)
             touching, room = {}, inf
-            for face in self.faces:
-                gap, normal = face.gap(self.x)
+            near = {face: face.gap(self.x) for face in self.faces}
+            for face, (gap, normal) in near.items():
                 if gap <= 0.5 * self.world.hair:
                     touching[face] = normal
                 else:
@@ -176,7 +176,7 @@ class Lone:
             if any(self.v.dot(normal) < -slow for normal in touching.values()):
                 self._blow(touching)
             elif released or not self._ride(touching, room):
-                self._fly(touching)
+                self._fly(touching, near)
             released = False
             rounds += 1
             if self.t - begin >= GAINED * self.dt:
@@ -277,7 +277,7 @@ class Lone:
 
     # Flight and blows
 
-    def _fly(self, touching: dict[Face, Vec2d]) -> None:
+    def _fly(self, touching: dict[Face, Vec2d], near: dict[Face, tuple[float, Vec2d]]) -> None:
         """Fly to the next contact, the exit or the end."""
         if self.on >= 0:
             self._knot()
@@ -293,7 +293,7 @@ class Lone:
             if (clear := self.world.clear(path, face, span)) < span:
                 span, reason = clear, ""
         for face in self.faces:
-            met = self.world.meets(path, face, span, face in touching)
+            met = self.world.meets(path, face, span, face in touching, near=near[face])
             if met < span:
                 span, reason = met, ""
         if span > 0.0:

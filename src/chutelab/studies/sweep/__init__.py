@@ -199,7 +199,7 @@ def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
         yield team
     except BaseException:
         if team.executor is not None:
-            # The pool's thread fails at a job that is cancelled when its process dies: all go first.
+            # Its thread fails at a job that is cancelled when its process dies: jobs go first.
             gone = Event()
             with suppress(RuntimeError), _without_ctrl_c():
                 team.executor.submit(int).add_done_callback(lambda _: gone.set())

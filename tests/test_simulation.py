@@ -217,3 +217,13 @@ def test_a_machine_that_the_core_builds_as_it_runs_is_the_one_handed_over(text, 
     assert found.contacts > 0
     assert not found.laws
     assert not found.machine.is_ahead
+
+
+def test_a_run_that_engines_move_to_an_origin_of_its_own_follows_any_other():
+    """What a run does not have, such as totals of a crowd, is frozen with the run before."""
+    simulate("perpendicular")
+    far = {"surface": [{"name": "floor", "from": [-1.0, -90.0], "to": [9.0, -90.0]}],
+           "stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]}, "run": {"until": 1.0}}  # fmt: skip
+    runs = [simulate(scene.from_dict(far)) for _ in range(2)]
+    assert same(*runs)
+    np.testing.assert_allclose(runs[0].ends()[1]["position"], [[0.0, 1.0 - 0.5 * 9.81]], atol=1e-12)

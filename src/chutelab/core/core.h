@@ -405,6 +405,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
 void solve_contacts(int again);
 
 /* closing.c */
+void give_in(const Contact *list, int count);
 void close_step(double h);
 void take_back(int i);
 void end_in_contact(int i, int reason);

@@ -78,6 +78,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     } else if (surface >= 0 && (W.interact || d->held_count))
         sunk = gap_to(surface_at(surface, d->t), d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius;
     if (sunk) least *= HARDLY;
+    least = MAX(least, d->open);
     for (int n = 0; n < d->held_count && surface >= 0 && !has_corners(d); n++) {
         if (sunk || !is_one(d, d->held[n], surface)) continue;
         double haste = hastes(surface_at(surface, d->t), d);
@@ -428,6 +429,7 @@ static void jam(Contact *struck, double t) {
         memcpy(&d->vx, v, sizeof v);
     }
     account(list, count);
+    give_in(list, count);
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
@@ -533,20 +535,21 @@ static int goes_straight_on(const Contact *c) {
     return 0;
 }
 
-/* Whether a disk by itself, which does not turn and hardly loses anything in a blow, rattles at a belt: where a
-   wedge narrows there is no end of blows, nor of the belt's work. */
-static int is_driven(int i, double approach) {
+/* Whether a disk by itself, which does not turn, rattles at a belt, by blows of which some (`rest`: this one) hardly
+   lose anything: where a wedge narrows there is no end of blows, nor of the belt's work. */
+static int is_driven(int i, double approach, double rest) {
     const Disk *d = W.disks + i;
     double nx, ny;
     const int *list;
     if (W.interact || d->inertia > 0 || approach < SLOW * W.g * W.dt) return 0;
-    int count = surfaces_near(i, &list);
+    int count = surfaces_near(i, &list), moves = 0;
     for (int n = 0; n < count; n++) {
         const Surface *s = surface_at(list[n], d->t);
-        if (s->speed == 0 || s->there != THERE || !is_near(s, d)) continue;
-        if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) < d->radius) return 1;
+        if (s->there != THERE || !is_near(s, d) || gap_to(s, d->x, d->y, d->radius, &nx, &ny) >= d->radius) continue;
+        moves |= s->speed != 0;
+        rest = MAX(rest, surface_pair(d, list[n])->restitution);
     }
-    return 0;
+    return moves && rest > LASTING;
 }
 
 /* Whether a blow's impulse is all that changed the velocity of its disk. */
@@ -597,7 +600,7 @@ static void strike(int i, int j, double t) {
     }
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
     int jammed = impacts >= (j >= 0 ? CROWDED : c.rest < 1 ? JAM : CROWDED);
-    if (jammed && c.rest > LASTING && is_driven(i, -u[0])) {
+    if (jammed && is_driven(i, -u[0], c.rest)) {
         a->impacts = STALL + 1;
         jammed = 0;
     }

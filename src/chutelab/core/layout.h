@@ -75,6 +75,7 @@ typedef struct {
     double since;               /* s; latest impact */
     double slept;               /* s; since when it is asleep */
     double calm;                /* s; since when nothing at its contacts slips or moves apart */
+    double open;                /* m/s; what the solve leaves open where a belt carries one of those in touch, see `give_in` */
     double rest;                /* s; since when it is at rest: the same to the finer bound of falling asleep,
                                    or it stays where it is, however it rattles there */
     double anchor[3];           /* m; where its rest began: x, y, and how far its rim has turned since */

@@ -78,14 +78,16 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 /* Contacts of what has corners up to which they are solved to rounding, and blows on them are no hops: more are
    a crowd. */
 #define FEW_CONTACTS 32
+/* Times `W.soft`: approach up to which two of a crowd with corners that rest on something are left to the next step. */
+#define LATEST 4
 /* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
 #define SHOCKS 4
 
 static inline double square(double a) { return a * a; }
 
 /* A place at which a particle with corners is near something: the normal towards it, how near, where; and which corner
-   of both that is, on what, see corners.c. */
-typedef struct { double nx, ny, gap, later, x, y; int which, on; } Touch;
+   of both that is, on what, see corners.c; of how many. */
+typedef struct { double nx, ny, gap, later, x, y; int which, on, many; } Touch;
 /* Such places of two, at most. */
 #define MOST_TOUCHES 8
 
@@ -303,6 +305,8 @@ int would_overlap(int i, double x, double y, int j, double t, double deep);
 double meet_corners(int i, int j, double from, double until, double soft);
 void describe_touch(Contact *c, int i, int j, const Touch *t);
 const Contact *place_before(const Contact *c);
+int list_still(int i, int j, double h, const Contact **list);
+void go_on_with(Contact *c, const Contact *last, double h);
 double opens_by(const Contact *c);
 int lies_flat(int i, int k);
 int list_struck(int i, int j, double t, Contact *list);

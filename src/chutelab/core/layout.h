@@ -291,6 +291,8 @@ typedef struct {
     int cornered;           /* i has corners, and perhaps j */
     double own[2], others[2]; /* m; of what has corners: levers of a normal and of a tangential impulse, on i and on j */
     double spot[2];         /* m; ... and the place from the centre of i, as that is turned */
+    double looked[7];       /* m, rad; as the place was looked up: the gap, and x, y and `turned` of i and of j */
+    int places, pad;        /* at which the two touched then */
 } Contact;
 
 /* What the impulses of a solve change of a disk, and what one of 1 N s does to it. The first of all is of

@@ -144,7 +144,7 @@ class Module:
         """Free all arrays and reset all structs."""
         for rows in self._own:
             rows.fill(0)
-        # The core takes what it has not come to for zeros: not so numbers of a run that never began.
+        # The core takes what it has not come to for zeros: nothing of a run that never began.
         self._bytes[self._first : self._first + self._begun] = 0
 
     def work(self, name: str) -> None:

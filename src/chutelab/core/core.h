@@ -282,6 +282,7 @@ void agree_with_contacts(double h);
 double missed_by_joints(void);
 void tug_all(int way);
 void drop_tugs(void);
+void forget_tugs(void);
 void cut_step(double t);
 int is_cut(void);
 void cut_at_snaps(void);

@@ -40,10 +40,10 @@ DOMINOES = {
     "spring": [{"from": [0.0, 0.5], "particle": 1, "length": 0.2, "stiffness": 50.0,
      "damper": 0.1}],
     "pin": [{"from": [0.2, 0.04], "particle": 2}],
-    "stream": [{"particle": "ball", "count": 2, "at": [0.0, 0.2], "velocity": [0.0, 0.0],
-     "rate": 1.0, "interact": True}, {"particle": "brick", "count": 2, "at": [0.2, 0.032],
-     "to": [0.4, 0.032], "velocity": [0.0, 0.0]}, {"particle": "wedge", "at": [0.6, 0.1],
-     "velocity": [0.0, 0.0]}],
+    "stream": [{"particle": "ball", "count": 2, "at": [0.0, 0.2], "to": [0.1, 0.2],
+     "velocity": [0.0, 0.0], "interact": True}, {"particle": "brick", "count": 2,
+     "at": [0.2, 0.032], "to": [0.4, 0.032], "velocity": [0.0, 0.0]}, {"particle": "wedge",
+     "at": [0.6, 0.1], "velocity": [0.0, 0.0]}],
 }  # fmt: skip
 """Boxes with joints, which pymunk alone has."""
 
@@ -297,6 +297,10 @@ BY_HAND = [
              "> 0" if table == "spring" else "unknown"),
         )
     ),
+    *(("dominoes", {f"{table}": [{"particle": 1, "from": [0.1, 0.2]}]}, f"{table}[0].from",
+       "another place") for table in ("string", "rod")),
+    ("alone", {"rod": [{"particle": 0, "other": 1}], "stream.interact": True, "stream.rate": 1.0},
+     "rod[0].other", "another place"),
     ("alone", {"spring": [{"from": [0.0, 0.5]}]}, "spring[0].stiffness", "missing"),
     ("alone", {"spring": [{"from": [0.0, 0.5], "stiffness": 9.0, "damper": -1.0}]},
      "spring[0].damper", "from 0"),

@@ -187,3 +187,18 @@ def test_a_recording_keeps_what_air_took(tmp_path):
     run.save(tmp_path / "air.npz")
     assert type(run).load(tmp_path / "air.npz").ledger == run.ledger
     assert run.measure("ledger.air_loss") == run.ledger.air_loss
+
+
+@pytest.mark.parametrize("x", [-0.1, -0.099, -0.098])
+def test_air_gives_nothing_back_where_a_blow_ends_a_step(x):
+    """What it takes is known up to the instant of the blow: 1/2 m v² only falls in flight."""
+    box = {"shape": "box", "size": [2.0 * R, 2.0 * R], "mass": M, "spin": True}
+    run = simulate(sc.from_dict({
+        "air_density": AIR, "gravity": 0.0, "particle": box,
+        "stream": [{"at": [x, 0.0], "velocity": [3.0, 0.0], "interact": True, "restitution": 0.0},
+                   {"at": [0.1, 0.0], "velocity": [-2.0, 0.0]}],
+        "run": {"engine": "contact", "dt": 2e-3, "until": 0.1},
+    }))  # fmt: skip
+    assert not run.laws
+    for knots in (run.track(i) for i in range(2)):
+        assert np.diff(knots["entries"][:, 2]).min() >= 0.0

@@ -832,7 +832,8 @@ def test_colours_are_nearly_the_stages_and_what_stands_still_keeps_its_own(runs,
 def written(pictures, delays):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "written.gif"
-        write_gif(path, map(Image.fromarray, pictures), delays)
+        opaque = (np.dstack([one, np.full(one.shape[:2], 255, np.uint8)]) for one in pictures)
+        write_gif(path, opaque, delays)
         return path.read_bytes()
 
 
@@ -869,14 +870,14 @@ def test_only_what_changed_is_in_a_frame_and_what_stays_is_one_frame():
 def test_failure_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
     path = tmp_path / "lesson.gif"
     path.write_text("old")
-    drawn = Stage.frame
+    drawn = Stage.paint
 
     def breaks(self, index):
         if index == 7:
             raise RuntimeError("planted")
         return drawn(self, index)
 
-    monkeypatch.setattr(Stage, "frame", breaks)
+    monkeypatch.setattr(Stage, "paint", breaks)
     with pytest.raises(RuntimeError, match="planted"):
         animate(by_hand(), path, fps=10, slow=4.0)
     assert path.read_text() == "old"

@@ -1,17 +1,19 @@
 """The contact engine where friction locks, and where what lay on a surface parts from it."""
 
-from math import cos, pi, radians, sin, sqrt
+from math import cos, pi, radians, sin, sqrt, tan
 
 import numpy as np
 import pytest
 
-from chutelab.engines import contact, exact
+from chutelab.engines import contact, exact, pymunk
 from chutelab.engines.contact import run
-from chutelab.results import Kind
+from chutelab.engines.simulation import simulate
+from chutelab.results import REASONS, Kind
 from chutelab.results.laws import judge
 from chutelab.results.recorder import StalledError
 from machines import bent, face, scene_of, thrown
 from shared import some
+from test_repeats import CROWD
 
 G = 9.81
 R = 0.01
@@ -276,3 +278,47 @@ def test_what_belts_drive_to_and_fro_without_end_is_told(engine):
     # Exact goes on until rounding ends it, contact says so where a step has too many blows.
     assert told.value.t == pytest.approx(end, abs={exact: 1e-4, contact: 6e-3}[engine])
     assert told.value.t < end + 1e-4
+
+
+@pytest.mark.parametrize("engine", [exact, contact, pymunk])
+def test_a_belt_that_throws_into_a_mirror_works_without_end(engine):
+    """A belt with endless grip carries a disk that does not turn under a smooth plate of ε = 1.
+
+    The plate reflects it to (-v cos 2β, -v sin 2β), β between plate and belt; the belt stops what
+    falls and pulls the rest back to -v: work m v · v (1 - cos 2β) each time, and no time between.
+    """
+    beta, v, high = 0.5, 2.0, 0.05
+    machine = scene_of(
+        particle={"radius": R, "spin": False},
+        surface=[
+            face("belt", (0.0, 0.0), (1.0, 0.0), speed=-v, **GRIP),
+            face("mirror", (0.0, 0.0), (cos(beta), sin(beta)), restitution=1.0, friction=0.0),
+        ],
+        stream={"at": [0.5, R + high]},
+        run={"until": 1.0},
+    )  # fmt: skip
+    with pytest.raises(StalledError) as told:
+        engine.run(machine)
+    recording = told.value.recording
+    reached = sqrt(2.0 * high / G) + (0.5 - R / tan(beta / 2.0)) / v
+    assert told.value.t == pytest.approx(reached, abs=1e-5)
+    blows = recording.select(Kind.IMPACT)[2:22]
+    assert blows["surface"].tolist() == 10 * [0, 1] or blows["surface"].tolist() == 10 * [1, 0]
+    given = blows["tangential_impulse"][blows["surface"] == 0]
+    work = recording.particle.mass * v**2 * (1.0 - cos(2.0 * beta))
+    # Where a step begins, contact adds what the weight does in it.
+    rtol = G * machine.dt / v if engine is contact else 1e-5
+    np.testing.assert_allclose(abs(given) * v, work, rtol=rtol)
+
+
+def test_what_is_held_between_carried_disks_rattles_no_longer_than_it_helps():
+    """Round a pulley, where v² is about g ρ, those below leave first, under others that ride on.
+
+    Nothing moves what is carried, so there may be no room between two of these, or one and the
+    belt: blows would go on without end, and each cut the step to a fiftieth. What the solve of all
+    leaves open stays open to the step's end, so steps are as many as the time has, and a few.
+    """
+    slower = CROWD.with_values({"incoming.speed": 1.9})
+    recording = simulate(slower, engine="contact", max_seconds=20.0)
+    assert (recording.ended == REASONS.index("landed")).all()
+    assert recording.steps < 1.1 * recording.knots["t"].max() / slower.run.dt

@@ -505,6 +505,24 @@ def test_what_is_pushed_by_hand_keeps_its_rod():
     assert ledger.push_work == pytest.approx(0.2 * 0.01, rel=1e-3)
 
 
+def test_what_folds_on_a_short_arm_spins_up_and_down_again_by_the_same_energy():
+    """1/2 m v² + 1/2 I ω² + m g y stays, at 100 rad/s too, where a usual step finds no pull."""
+    boxes = [{"name": name, "shape": "box", "size": [size, size], "mass": mass, "spin": True}
+             for name, size, mass in (("heavy", 0.02, 0.1), ("light", 0.023, 0.01))]  # fmt: skip
+    run = simulate({
+        "particle": boxes, "run": {"until": 0.7},
+        "stream": [
+            {"particle": "heavy", "at": [-0.3, 0.145], "velocity": [0.0, 0.0], "interact": True},
+            {"particle": "light", "at": [-0.15, 0.281], "velocity": [0.0, 0.0]},
+        ],
+        "pin": [{"particle": 0, "from": [-0.344, 0.1], "other": 1}],
+        "string": [{"particle": 1, "from": [0.13, 0.525]}],
+    }, engine="contact")  # fmt: skip
+    assert ledger_closes(run)
+    assert run.unsolved.max() < 1e-8
+    assert run.steps < 1400
+
+
 # A cradle, and what is refused
 
 

@@ -161,8 +161,8 @@ def test_while_a_crowd_runs_no_height_is_below_the_lowest_point(shown, name):
       return [one, all];
     }""")
     assert least[0] >= 0.0
-    # Curves may dip a little below the lower of two knots.
-    assert -1e-6 < least[1] <= 0.0
+    # A crowd's track leaves out hops, g dt²/8, dt = 1 ms; between knots it dips by two at most.
+    assert -9.81 * 1e-3**2 / 4.0 < least[1] <= 0.0
 
 
 @pytest.mark.slow

@@ -44,6 +44,22 @@ def test_boxes_in_balance_on_a_see_saw_stay_so():
     assert np.abs(seesaw(0.2, 0.1).swings["angle"]).max() < 1e-9
 
 
+def test_a_column_on_a_hinged_plate_is_solved_and_gets_no_energy():
+    """Solves that end at their cap give none: impulses do no work on what they leave.
+
+    m v dv + I w dw <= 0 with what moves before and after.
+    """
+    plate = {**LEVER, "friction": 0.5, "restitution": 0.0, "mass": 2.0, "spring": 20.0,
+             "damper": 0.5}  # fmt: skip
+    row = {"count": 25, "at": [0.0, 0.51 * H], "to": [0.0, 24.87 * H], "velocity": [0.0, 0.0],
+           "interact": True, "friction": 0.5, "restitution": 0.0}  # fmt: skip
+    scene = {"particle": {**BOX, "mass": 0.01}, "surface": [plate], "stream": row,
+             "run": {"until": 0.2}}  # fmt: skip
+    run = sound(chutelab.simulate(scene, engine="contact"))
+    assert run.gained < 1e-17
+    assert run.unsolved.max() < 1.5e-5
+
+
 def test_boxes_on_a_see_saw_turn_it_as_one_rigid_body():
     """(I + sum m (l² + h² / 4 + I_box / m)) a = -sum m g (l cos - h / 2 sin), order 2."""
     left, right, end = 0.2, 0.15, 0.3

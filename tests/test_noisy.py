@@ -146,6 +146,15 @@ def test_an_end_of_the_range_that_no_seed_doubts_has_no_error(error, told, monke
 
 
 @pytest.mark.slow
+def test_a_least_at_the_end_of_a_range_is_told_so():
+    """Faster belts throw a bed sooner off; below 2.1 m/s lower layers leave under upper ones."""
+    found = minimize(CROWD, {"incoming.speed": (1.5, 2.5)}, "track.t.mean", repeat=2, points=8)
+    assert found.answer.values == (2.5,)
+    assert found.answer.place == "end"
+    assert "end of the range" in str(found)
+
+
+@pytest.mark.slow
 def test_an_answer_of_a_stream_has_no_more_digits_than_its_error_leaves(tmp_path):
     found = solve(
         CROWD, {"plate.angle_deg": (10.0, 35.0)}, {"arrival.vx.mean": 1.6}, repeat=3, points=10

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chutelab import machine, scene
+from chutelab import core, machine, scene
 from chutelab.engines.simulation import ENGINES, choose, follow, simulate
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.ledger import ledger
@@ -217,3 +217,25 @@ def test_a_machine_that_the_core_builds_as_it_runs_is_the_one_handed_over(text, 
     assert found.contacts > 0
     assert not found.laws
     assert not found.machine.is_ahead
+
+
+def test_a_run_that_engines_move_to_an_origin_of_its_own_follows_any_other():
+    """What a run does not have, such as totals of a crowd, is frozen with the run before."""
+    simulate("perpendicular")
+    far = {"surface": [{"name": "floor", "from": [-1.0, -90.0], "to": [9.0, -90.0]}],
+           "stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]}, "run": {"until": 1.0}}  # fmt: skip
+    runs = [simulate(scene.from_dict(far)) for _ in range(2)]
+    assert same(*runs)
+    np.testing.assert_allclose(runs[0].ends()[1]["position"], [[0.0, 1.0 - 0.5 * 9.81]], atol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["exact", "contact"])
+def test_a_scene_that_was_handed_over_and_never_run_leaves_nothing_behind(engine):
+    """As when Ctrl-C comes between: the core takes memory that it has not been in for zeros."""
+    before = simulate("perpendicular", engine=engine)
+    module = core.Module()
+    assert module.begin_with(np.full(1000, np.nan))
+    core.give_back(module)
+    assert same(simulate("perpendicular", engine=engine), before)
+    assert core.borrow() is module
+    core.give_back(module)

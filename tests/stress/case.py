@@ -73,8 +73,8 @@ class Case:
         Engines that must refuse the scene, and the key that they have to name.
     may_refuse : mapping of str to str
         Engines that may do so instead of keeping the laws.
-    driven : bool
-        Whether belts drive its particle to and fro without end, which the engines tell.
+    driven : tuple of str
+        Engines that have to tell that belts drive its particle to and fro without end.
     unpromised : mapping of str to str
         Engines that do not promise to keep the laws here, and why: the test is skipped.
     ends : tuple of str
@@ -99,7 +99,7 @@ class Case:
     formula: Callable[[Evidence], Verdict | None] | None = None
     refusals: Mapping[str, str] = field(default_factory=dict)
     may_refuse: Mapping[str, str] = field(default_factory=dict)
-    driven: bool = False
+    driven: tuple[str, ...] = ()
     unpromised: Mapping[str, str] = field(default_factory=dict)
     ends: tuple[str, ...] = ()
     inside: tuple[float, float, float, float] | None = None

@@ -126,6 +126,8 @@ class Module:
         self._bytes = np.empty(0, np.uint8)
         self._begins = {name: self.call(name.lower()) for name in SUBJECTS}
         self._look()
+        self._first: int = self.structs["Room"].first
+        self._begun = 0
         self.forget()
 
     def call(self, name: str, *numbers: float) -> Any:
@@ -140,8 +142,10 @@ class Module:
 
     def forget(self) -> None:
         """Free all arrays and reset all structs."""
-        for struct in self.structs.values():
-            ctypes.memset(ctypes.addressof(struct), 0, ctypes.sizeof(struct))
+        for rows in self._own:
+            rows.fill(0)
+        # The core takes what it has not come to for zeros: nothing of a run that never began.
+        self._bytes[self._first : self._first + self._begun] = 0
 
     def work(self, name: str) -> None:
         """Call a function that may take more memory; it makes all views of arrays invalid.
@@ -165,6 +169,10 @@ class Module:
             for name, begin in self._begins.items()
         }
         self.world: Any = self.structs["World"]
+        self._own = [
+            self._bytes[begin : begin + ctypes.sizeof(_struct(name))]
+            for name, begin in self._begins.items()
+        ]
 
     @property
     def size(self) -> int:
@@ -201,6 +209,14 @@ class Module:
         """Copy arrays, flat and contiguous, to where the fields of a struct point."""
         for name, array in arrays.items():
             self.array(name, np.dtype(np.uint8), array.nbytes, of)[:] = array.view(np.uint8)
+
+    def begin_with(self, numbers: NDArray[Any]) -> bool:
+        """Copy numbers to where the first array will lie; return whether there is room for them."""
+        rows = self._bytes[self._first : self._first + numbers.nbytes]
+        if fits := len(rows) == numbers.nbytes:
+            self._begun = numbers.nbytes
+            rows[:] = numbers.view(np.uint8)
+        return fits
 
     def run(self, name: str, steps: int, lacking: int) -> int:
         """Call a function for so many steps at most, as `work`; `lacking` tells of no memory."""

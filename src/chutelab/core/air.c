@@ -2,8 +2,8 @@
    their area: with Schiller's and Naumann's coefficient, as in `theory.drag`. What rides or sleeps is held against it.
 
    A step is split (Strang): half of what air does in it comes before the flight, half after it. So paths are
-   parabolas between two steps, and of second order in the step. A blow on a disk by itself comes with
-   what air has done by then; in a crowd that is off by up to half a step. */
+   parabolas between two steps, and of second order in the step. A blow comes with
+   what air has done by then. */
 
 #include "core.h"
 

@@ -178,6 +178,24 @@ static void settle_down(Disk *d, double h) {
     d->anchor[2] = 0;
 }
 
+/* Have what touches a disk that a belt carries, with all that touches it in turn, rattle no longer than it helps: nothing
+   moves what is carried, so between two of these, or one and a belt, there may be no room. What the solve of all of them
+   leaves open, blows leave open, too: see `left_over`. */
+void give_in(const Contact *list, int count) {
+    double open = 0, u[3], v[3];
+    int carried = 0;
+    for (int n = 0; n < count; n++) carried |= list[n].j >= 0 && W.disks[list[n].j].mode == RIDING;
+    for (int n = 0; n < count && carried; n++) {
+        relative(list + n, 1, u);
+        relative(list + n, 0, v);
+        open = MAX(open, u[0] + asks(list + n, list[n].impulse[0]) - v[0]);
+    }
+    for (int n = 0; n < count && carried; n++) {
+        W.disks[list[n].i].open = open;
+        if (list[n].j >= 0) W.disks[list[n].j].open = open;
+    }
+}
+
 /* After the solve: entries, supports, timers, tracks. */
 void close_step(double h) {
     /* The share of the impulses that belongs to the step before; of a new contact, none. */
@@ -192,7 +210,7 @@ void close_step(double h) {
         d->supports = 0;
         if (W.length_before > 0.01 * W.step) d->impacts = 0;
         for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
-        d->lacks = 0;
+        d->lacks = d->open = 0;
         if (d->mode == FREE) {
             d->calm += h;
             /* What has joints does not fall asleep. */
@@ -209,6 +227,7 @@ void close_step(double h) {
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         while (to < W.contact_count && (!W.interact || W.contacts[to].island == W.contacts[from].island)) to++;
         account(W.contacts + from, to - from);
+        give_in(W.contacts + from, to - from);
     }
     for (int n = 0; n < W.contact_count; n++) {
         Contact *c = W.contacts + n;

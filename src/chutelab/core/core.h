@@ -81,14 +81,16 @@ enum Phase { PART, STEP, WITHIN };
 /* Contacts of what has corners up to which they are solved to rounding, and blows on them are no hops: more are
    a crowd. */
 #define FEW_CONTACTS 32
+/* Times `W.soft`: approach up to which two of a crowd with corners that rest on something are left to the next step. */
+#define LATEST 4
 /* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
 #define SHOCKS 4
 
 static inline double square(double a) { return a * a; }
 
 /* A place at which a particle with corners is near something: the normal towards it, how near, where; and which corner
-   of both that is, on what, see corners.c. */
-typedef struct { double nx, ny, gap, later, x, y; int which, on; } Touch;
+   of both that is, on what, see corners.c; of how many. */
+typedef struct { double nx, ny, gap, later, x, y; int which, on, many; } Touch;
 /* Such places of two, at most. */
 #define MOST_TOUCHES 8
 
@@ -247,10 +249,6 @@ void prepare_hinge(Mover *m);
 double hinge_step(double h);
 void bound_hinges(double t, double h);
 void begin_hinges(double t, double h);
-double turn_hinges(void);
-void start_hinges(int back);
-void lean_on_hinges(double *none, double *all);
-void lessen_hinges(double less);
 double gained_by_hinges(void);
 void leave_hinges(double t);
 double meet_stops(double t, double end);
@@ -270,7 +268,9 @@ void stop_hinges(double t);
 void go_on(void);
 
 /* hung.c */
-void sweep_hung(Contact *list, int count, int sweeps, double enough);
+SolverBody hinge_body(int k);
+int set_hinge_rows(SolverRow *rows, int body);
+void take_hinge_rows(const SolverRow *rows, int count, int body);
 
 /* hand.c */
 void kick_disks(double h);
@@ -285,6 +285,7 @@ void agree_with_contacts(double h);
 double missed_by_joints(void);
 void tug_all(int way);
 void drop_tugs(void);
+void forget_tugs(void);
 void cut_step(double t);
 int is_cut(void);
 void cut_at_snaps(void);
@@ -307,6 +308,8 @@ int would_overlap(int i, double x, double y, int j, double t, double deep);
 double meet_corners(int i, int j, double from, double until, double soft);
 void describe_touch(Contact *c, int i, int j, const Touch *t);
 const Contact *place_before(const Contact *c);
+int list_still(int i, int j, double h, const Contact **list);
+void go_on_with(Contact *c, const Contact *last, double h);
 double opens_by(const Contact *c);
 int lies_flat(int i, int k);
 int list_struck(int i, int j, double t, Contact *list);
@@ -411,6 +414,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
 void solve_contacts(int again);
 
 /* closing.c */
+void give_in(const Contact *list, int count);
 void close_step(double h);
 void unload(int i, const int *up);
 void take_back(int i);

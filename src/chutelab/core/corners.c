@@ -34,6 +34,9 @@
 #define HELD 1e-13
 /* Share of it that a blow may give by rounding. */
 #define GAINS 1e-12
+/* Of the radius inside, by which two in a crowd may move before the places at which they touch are looked up anew: by its
+   square the gap is off then. */
+#define STILL 2e-4
 /* Candidates for a place: corners of both. */
 #define CANDIDATES (2 * MOST_CORNERS)
 
@@ -343,6 +346,7 @@ static int list_between(Shape *a, Shape *b, double near, double within, Touch *l
         }
         count += !known;
     }
+    for (int n = 0; n < count; n++) list[n].many = count;
     return count;
 }
 
@@ -612,6 +616,20 @@ static void take_levers(Contact *c, const Touch *t, double *feels) {
     }
 }
 
+/* Place and angle of what a contact is between, but for what does not move. */
+static void pose_now(const Contact *c, double *pose) {
+    const Disk *d = W.disks + c->i, *o = W.disks + MAX(c->j, 0);
+    memcpy(pose, (double[]){d->x, d->y, d->turned, c->j < 0 ? 0 : o->x, c->j < 0 ? 0 : o->y, c->j < 0 ? 0 : o->turned},
+           6 * sizeof(double));
+}
+
+/* Note when a place was looked up, as one of so many. */
+static void note_look(Contact *c, int places) {
+    c->looked[0] = c->gap;
+    c->places = places;
+    pose_now(c, c->looked + 1);
+}
+
 /* Acceleration along the normal by which a contact opens if nothing holds it, m/s2. */
 double opens_by(const Contact *c) {
     const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
@@ -633,6 +651,7 @@ RARELY void describe_touch(Contact *c, int i, int j, const Touch *t) {
                    .owner = W.owner_count, .rest = pair->restitution, .falls = pair->falls, .friction = pair->friction};
     c->two = j >= 0 && b->mode == FREE;
     take_levers(c, t, feels);
+    note_look(c, t->many);
     if (c->two) {
         mass += b->inv_mass;
         turn += b->inv_inertia;
@@ -682,6 +701,53 @@ RARELY const Contact *place_before(const Contact *c) {
         found = o;
     }
     return least <= 0.5 * W.disks[c->i].inner ? found : 0;
+}
+
+/* By how much the gap of a contact has changed by what both have moved since their place was looked up, m; or NaN if
+   that is more than STILL of a radius. */
+static double went_since(const Contact *c) {
+    double pose[6], size = W.disks[c->i].radius, turns;
+    pose_now(c, pose);
+    for (int n = 0; n < 6; n++) pose[n] -= c->looked[n + 1];
+    if (c->j >= 0) size = MAX(size, W.disks[c->j].radius);
+    turns = size * (fabs(pose[2]) + fabs(pose[5]));
+    if (!(fabs(pose[0] - pose[3]) + fabs(pose[1] - pose[4]) + turns <= STILL * inner_of(c->i, c->j))) return NAN;
+    return (pose[0] - pose[3]) * c->nx + (pose[1] - pose[4]) * c->ny + c->own[0] * pose[2] + c->others[0] * pose[5];
+}
+
+/* Of two in a crowd that have hardly moved since their places were looked up list the contacts of the step before;
+   0 if they are to be looked up. */
+RARELY int list_still(int i, int j, double h, const Contact **list) {
+    const Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
+    const Surface *s = W.surfaces + (j < 0 ? -1 - j : 0);
+    int count = 0;
+    if (W.earlier_count <= FEW_CONTACTS || (j < 0 ? s->mover >= 0 || s->shape != SEGMENT : b->mode != FREE)) return 0;
+    double turns = fabs(a->spin) * a->radius + (j < 0 ? 0 : fabs(b->spin) * b->radius);
+    if (turns * h > STILL * inner_of(i, j)) return 0;
+    for (int k = a->before; k >= 0 && count < MOST_TOUCHES; k = W.earlier[k].next)
+        if (W.earlier[k].j == j) list[count++] = W.earlier + k;
+    if (!count || list[0]->places != count) return 0;
+    for (int n = 0; n < count; n++)
+        if (isnan(went_since(list[n]))) return 0;
+    return count;
+}
+
+/* Fill in a contact as it was in the step before, with the gap that it has now. */
+RARELY void go_on_with(Contact *c, const Contact *last, double h) {
+    double u[3];
+    *c = *last;
+    c->gap = c->looked[0] + went_since(c);
+    c->most = INFINITY;
+    c->share = 1;
+    c->gives = c->parts = c->clings = 0;
+    c->leaves = 0;
+    if (c->j >= 0) {
+        const Disk *b = W.disks + c->j;
+        c->other[0] = b->vx * c->nx + b->vy * c->ny;
+        c->other[1] = b->vx * c->ny - b->vy * c->nx;
+    }
+    relative(c, 0, u);
+    c->free_gap = c->gap + (u[0] + (c->j < 0 ? 0.5 * h * (W.gx * c->nx + W.gy * c->ny) : 0)) * h;
 }
 
 /* ------------------------------------------------------------------------------------------- the blow */

@@ -239,7 +239,7 @@ void go_on(void) {
 }
 
 /* Sweep over stops and motors of all hinges; return by how much a speed changed, rad/s. */
-double turn_hinges(void) {
+static double turn_hinges(void) {
     double worst = 0;
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!is_hinge(m)) continue;
@@ -262,40 +262,13 @@ double turn_hinges(void) {
     return worst;
 }
 
-/* Give hinges the impulses with which the sweeps begin, or take them back. */
-void start_hinges(int back) {
+/* Give hinges the impulses with which the sweeps begin. */
+static void start_hinges(void) {
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!is_hinge(m)) continue;
         m->rate = m->before;
-        for (int n = 0; n < 3; n++) {
-            if (back) m->impulse[n] = 0;
-            m->rate += m->impulse[n] / m->inertia;
-        }
+        for (int n = 0; n < 3; n++) m->rate += m->impulse[n] / m->inertia;
     }
-}
-
-/* What stops and motors add to the slope of the cost along all impulses, see `lessen`. */
-void lean_on_hinges(double *none, double *all) {
-    for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
-        if (!is_hinge(m)) continue;
-        const double *J = m->impulse, at = m->drift - m->motor[0];
-        *none += J[2] * (m->before + at);
-        *all += J[2] * (m->rate + at);
-        for (int n = 0; n < 2; n++) {
-            if (J[n] == 0) continue;
-            *none -= J[n] * m->need[n];
-            *all += J[n] * (m->rate - m->before - m->need[n]);
-        }
-    }
-}
-
-/* Lessen the impulses of stops and motors by a share. */
-void lessen_hinges(double less) {
-    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++)
-        for (int n = 0; n < 3 && is_hinge(m); n++) {
-            m->rate -= less * m->impulse[n] / m->inertia;
-            m->impulse[n] -= less * m->impulse[n];
-        }
 }
 
 /* What hinges add to the left of the law of energy of a solve, see `check_solve`. */
@@ -315,7 +288,7 @@ double gained_by_hinges(void) {
    A stop that is met within it ends it. */
 void leave_hinges(double t) {
     for (int n = 0; n < ALONE && !W.swings_too; n++) {
-        if (n == 0) start_hinges(0);
+        if (n == 0) start_hinges();
         if (turn_hinges() == 0) break;
     }
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {

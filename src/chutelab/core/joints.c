@@ -253,17 +253,27 @@ void drop_tugs(void) {
     for (int i = W.low; i < W.high; i++) memset(W.disks[i].tug, 0, sizeof W.disks[i].tug);
 }
 
+/* The same as the step begins, of what missed and may be of any size: velocities are as they were noted. */
+void forget_tugs(void) {
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        if (d->tie < 0 || d->mode != FREE) continue;
+        memcpy(&d->vx, d->tugged, sizeof d->tugged);
+        memset(d->tug, 0, sizeof d->tug);
+    }
+}
+
 /* Find the forces of all joints in a step of length h, from the velocities as they are without them. A string
-   that would push is let go. */
+   that would push is let go. They begin with what was found last, unless that missed. */
 void pull_joints(double h) {
-    int strings = 1;
+    int strings = 1, anew = missed > 0;
     missed = 0;
     pulled_to = W.step_end;
     for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
         JointRow *r = W.joint_rows + j->row;
         for (int n = 0; n < rows_of(j); n++) {
             r[n].on = j->tied && h > 0 && (j->kind != STRING || j->taut || is_tight(j));
-            if (!r[n].on) r[n].kick = 0;
+            if (!r[n].on || anew) r[n].kick = 0;
         }
     }
     for (int again = 0; strings && again < LETS_GO; again++) {
@@ -305,6 +315,13 @@ void pull_joints(double h) {
         }
     }
     pull();
+    /* One that is let go since it would push, and yet gets longer, asks for a shorter step. */
+    for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
+        double d[4];
+        if (j->kind != STRING || !j->tied || W.joint_rows[j->row].on || !is_tight(j)) continue;
+        between(j, h, d);
+        missed = MAX(missed, length_of(d) / j->length - 1 - BAND);
+    }
 }
 
 /* The instant within (0, h] at which a string that is slack is pulled tight, INFINITY if it is not. */

@@ -42,6 +42,7 @@ typedef struct {
     int lacks;              /* whether there was too little */
     int budget;             /* [in] rounds, or steps, after which a run comes back at the latest */
     int packed;             /* [out] bytes of the events of a run that is over and whole, see `pack_events`; else 0 */
+    int first;              /* [out] where the first array begins */
 } Room;
 
 /* What every step asks of every disk stands first, in few lines of the processor's cache. */
@@ -74,6 +75,7 @@ typedef struct {
     double since;               /* s; latest impact */
     double slept;               /* s; since when it is asleep */
     double calm;                /* s; since when nothing at its contacts slips or moves apart */
+    double open;                /* m/s; what the solve leaves open where a belt carries one of those in touch, see `give_in` */
     double rest;                /* s; since when it is at rest: the same to the finer bound of falling asleep,
                                    or it stays where it is, however it rattles there */
     double anchor[3];           /* m; where its rest began: x, y, and how far its rim has turned since */
@@ -291,6 +293,8 @@ typedef struct {
     int cornered;           /* i has corners, and perhaps j */
     double own[2], others[2]; /* m; of what has corners: levers of a normal and of a tangential impulse, on i and on j */
     double spot[2];         /* m; ... and the place from the centre of i, as that is turned */
+    double looked[7];       /* m, rad; as the place was looked up: the gap, and x, y and `turned` of i and of j */
+    int places, pad;        /* at which the two touched then */
 } Contact;
 
 /* A contact of a sleeper, of which the other may be awake. Forces are on i, N. */
@@ -395,12 +399,12 @@ typedef struct {
     double *swing_work;  /* (swings, 3), J; `stopped`, `damped` and `pushed` of its mover then */
     Contact *contacts;   /* of this step */
     Contact *earlier;    /* of the step before */
-    SolverRow *rows;     /* (contacts) of those that are solved together */
-    RowLever *levers;    /* (contacts) ... of particles with corners */
-    SolverBody *solver_bodies; /* (disks + 1) ... and their disks */
+    SolverRow *rows;     /* (contacts + 3 movers) of those that are solved together */
+    RowLever *levers;    /* (contacts + 3 movers) ... of particles with corners, and hinges */
+    SolverBody *solver_bodies; /* (disks + 1 + movers) ... and their disks, and hinges */
     SolverFour *fours;   /* (four_room) the same in single precision */
     LeverFour *lever_fours; /* (four_room) ... and their levers */
-    LightBody *light_bodies; /* (disks + 1) */
+    LightBody *light_bodies; /* (disks + 1 + movers) */
     Frozen *frozen;      /* (2 contacts) of sleepers */
     int *frozen_links;   /* (4 contacts) the next end of one, 2 n and 2 n + 1 of frozen n, of the same disk, or -1 */
     double *balance;     /* (disks, 4, 2) room for conjugate gradients */

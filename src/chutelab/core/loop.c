@@ -472,6 +472,7 @@ static int begin_step(void) {
                 d->ux = d->vx;
                 d->uy = d->vy;
                 d->uspin = d->spin;
+                if (d->tie >= 0) memcpy(d->tugged, &d->vx, sizeof d->tugged);
             }
         }
         if (W.joint_count) pull_joints(h);
@@ -486,11 +487,14 @@ static int begin_step(void) {
             woke = 1;
         }
         double most = bent_step(h);
+        /* What a joint spins fast by a short arm: Newton's steps find its pull in shorter ones. */
+        if (W.joint_count && missed_by_joints() > 0) most = MIN(most, MAX(0.5 * h, SHORTEST * W.usual));
         if (h > (1 + 1e-9) * most) {
             set_step(most);
             W.step_end = W.t + most;
             h = W.step_end - W.t;
-            if (!woke) drop_tugs();
+            if (missed_by_joints() > 0) forget_tugs();
+            else if (!woke) drop_tugs();
             woke = 1;
         }
     } while (woke);

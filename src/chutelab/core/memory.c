@@ -12,7 +12,10 @@ static Room R;
 /* Up to where memory has been in use: beyond it is zero. */
 static double used;
 
-EXPORT Room *room(void) { return &R; }
+EXPORT Room *room(void) {
+    R.first = (int)(((unsigned long)&__heap_base + 15) / 16 * 16);
+    return &R;
+}
 
 void *set_apart(double count, unsigned size) {
     double bytes = size * count, have = PAGE * __builtin_wasm_memory_size(0);

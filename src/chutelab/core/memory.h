@@ -16,7 +16,7 @@ void *stretch(const void *rows, int count, int had, unsigned size);
 
 /* Knots, or events, of a run of particles that do not meet, up to which there is made more room for them
    before the host is to take them. */
-#define KEPT 100000
+#define KEPT 160000
 
 /* Whether all that was reserved is there. */
 int has_room(void);

@@ -19,9 +19,9 @@ Plan P;
 
 EXPORT Plan *plan(void) { return &P; }
 
-/* Lay out the rows of numbers, which the host fills in. */
+/* Lay out the rows of numbers, which the host fills in; it may have done so where the first array begins. */
 EXPORT int lay_out_plan(void) {
-    RESERVE(P.rows, (double)P.members * P.width + P.term_width);
+    P.rows = set_apart((double)P.members * P.width + P.term_width, sizeof *P.rows);
     P.terms = P.rows + P.members * P.width;
     RESERVE(P.nominal, P.members);
     RESERVE(P.movers, P.moving);
@@ -303,6 +303,7 @@ static void build_member(int member) {
 EXPORT int build(void) {
     segments = 0;
     arcs = 0;
+    if (!P.rows && !lay_out_plan()) return 0;
     build_member(0);
     P.segment_count = segment_count;
     P.arc_count = arc_count;

@@ -20,8 +20,10 @@
 #define ANY 1e100
 
 /* The rows: those between disks, and from `pairs` on those on what does not give way. `clings`: cohesion pulls in one;
-   `cornered`: one is of a particle with corners. */
+   `cornered`: one has levers, of a particle with corners or a hinge. */
 static int pairs, rows, bodies, clings, cornered;
+/* Those of contacts; the others are of hinges, whose bodies begin with that. */
+static int contacts, hinges;
 
 /* A choice between doubles is a jump in what is made of WebAssembly, between vectors it is not. */
 static inline double least(double a, double b) {
@@ -87,22 +89,23 @@ static int body_of(int i) {
     return bodies++;
 }
 
-/* The levers of a row: what has no corners turns by friction alone. */
+/* The levers of a row: what has no corners, and is no hinge, turns by friction alone. */
 static void set_lever(const SolverRow *r, const Contact *c) {
     const SolverBody *a = W.solver_bodies + r->a, *b = W.solver_bodies + r->b;
     RowLever *l = lever_of(r);
     for (int n = 0; n < 2; n++) {
         l->own[n] = c->cornered ? c->own[n] * a->bend : n;
-        l->others[n] = c->cornered ? c->others[n] * b->bend : n;
+        l->others[n] = c->hung ? -c->lever[n] : c->cornered ? c->others[n] * b->bend : n;
     }
     l->slips = a->turn * l->own[0] * l->own[1] + b->turn * l->others[0] * l->others[1];
 }
 
-/* Have all rows so much of their impulses. */
+/* Have all rows so much of their impulses; what bounds a motor stays. */
 static void scale(double by) {
     for (SolverBody *b = W.solver_bodies; b < W.solver_bodies + bodies; b++) b->x = b->y = b->rim = 0;
     for (SolverRow *r = W.rows; r < W.rows + rows; r++) {
-        wasm_v128_store(r->impulse, times(by, two(r->impulse)));
+        r->impulse[0] *= r->mass[0] > 0 ? by : 1;
+        r->impulse[1] *= by;
         r->moment *= by;
         push_row(r, two(r->impulse), r->moment);
     }
@@ -110,7 +113,7 @@ static void scale(double by) {
 
 /* Have cohesion pull at the bodies of all rows. */
 static void cling(const Contact *list) {
-    for (const SolverRow *r = W.rows; clings && r < W.rows + rows; r++)
+    for (const SolverRow *r = W.rows; clings && r < W.rows + contacts; r++)
         push_row(r, wasm_f64x2_make(-list[r->from].clings, 0), 0);
 }
 
@@ -119,14 +122,17 @@ static void cling(const Contact *list) {
 void set_rows(Contact *list, int count) {
     W.solver_bodies[0] = (SolverBody){.disk = -1};
     bodies = 1;
-    clings = pairs = cornered = 0;
+    clings = pairs = 0;
+    cornered = W.swings_too;
     for (int n = 0; n < count; n++) {
         body_of(list[n].i);
         if (list[n].two) body_of(list[n].j);
         pairs += list[n].two;
         cornered |= list[n].cornered;
     }
-    rows = count;
+    hinges = bodies;
+    for (int k = 0; k < W.mover_count && W.swings_too; k++) W.solver_bodies[bodies++] = hinge_body(k);
+    rows = contacts = count;
     SolverRow *pair = W.rows, *other = W.rows + pairs;
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
@@ -161,12 +167,14 @@ void set_rows(Contact *list, int count) {
         r->moment = c->impulse[2];
         r->change = 0;
         r->a = W.disks[c->i].body;
-        r->b = c->two ? W.disks[c->j].body : 0;
+        r->b = c->two ? W.disks[c->j].body : c->hung ? hinges + c->hung - 1 : 0;
         r->from = n;
         if (cornered) set_lever(r, c);
         clings |= c->clings > 0;
         if (!clings) push_row(r, two(r->impulse), r->moment);
     }
+    if (W.swings_too) rows += set_hinge_rows(W.rows + count, hinges);
+    for (SolverRow *r = W.rows + count; r < W.rows + rows; r++) push_row(r, two(r->impulse), 0);
     if (!clings) return;
     for (SolverBody *b = W.solver_bodies; b < W.solver_bodies + bodies; b++) b->x = b->y = b->rim = 0;
     cling(list);
@@ -177,8 +185,10 @@ void set_rows(Contact *list, int count) {
     scale(1);
 }
 
-/* Give contacts their impulses, and disks what these make of their velocities. */
+/* Give contacts their impulses, and disks what these make of their velocities; of hinges, which may take thousands of
+   sweeps, summed anew: changes would drift by what they are rounded to. */
 void take_rows(Contact *list, int count) {
+    if (W.swings_too) scale(1);
     for (int n = 0; n < count; n++) {
         const SolverRow *r = W.rows + n;
         double *J = list[r->from].impulse;
@@ -187,12 +197,13 @@ void take_rows(Contact *list, int count) {
         J[2] = r->moment;
     }
     cling(list);
-    for (const SolverBody *b = W.solver_bodies + 1; b < W.solver_bodies + bodies; b++) {
+    for (const SolverBody *b = W.solver_bodies + 1; b < W.solver_bodies + hinges; b++) {
         Disk *d = W.disks + b->disk;
         d->vx = d->ux + d->kick[0] + b->x;
         d->vy = d->uy + d->kick[1] + b->y;
         if (b->turn > 0) d->spin = d->uspin + b->rim * b->bend;
     }
+    if (W.swings_too) take_hinge_rows(W.rows + count, rows - count, hinges);
 }
 
 void begin_anew(void) { scale(0); }
@@ -385,20 +396,28 @@ static Two slopes(double one, double other) {
 
 /* Take the share of all impulses at which the cost is least; 0 if that is all of them. The slope grows with it:
    straight from `none` to `all`, below that where what an overlap asks for ends at its most, above where it ends
-   at what keeps it as deep: there the share is halved in on. Where sweeps end, the impulses do no work so on
-   the velocities that they leave, however far the sweeps had come: W J + q times J is at most 0. */
+   at what keeps it as deep: there it is looked for between two shares, halfway and where the straight line from one to
+   the other is zero. Where sweeps end, the impulses do no work so on the velocities that they leave, however far the
+   sweeps had come: W J + q times J is at most 0. */
 int lessen(void) {
     Two ends = slopes(0, 1);
-    double none = first(ends), all = second(ends), share, less = 0;
+    double none = first(ends), all = second(ends), share = 0, from = 0, to = 1, below = none, above = all;
     if (!(all > 0)) return 0;
-    share = none < 0 ? none / (none - all) : 0;
-    if (first(slopes(share, share)) > EPS * all) {
-        for (int n = 0; n < HALVINGS; n++) {
-            double middle = 0.5 * (less + share);
-            if (first(slopes(middle, middle)) > 0) share = middle;
-            else less = middle;
+    for (int n = 0; n < HALVINGS && below < 0 && from < to; n++) {
+        double middle = 0.5 * (from + to);
+        share = from - below / (above - below) * (to - from);
+        Two at = slopes(share, middle);
+        if (first(at) <= EPS * all) break;
+        to = share;
+        above = first(at);
+        if (middle < to && second(at) <= 0) {
+            from = middle;
+            below = second(at);
+        } else if (middle < to) {
+            to = middle;
+            above = second(at);
         }
-        share = less;
+        share = from;
     }
     scale(share);
     return 1;
@@ -421,7 +440,7 @@ void keep_bounds(void) {
 /* Take back what rounding presses; with endless friction even that would pull. Return whether there was any. */
 int drop_noise(void) {
     int dropped = 0;
-    for (SolverRow *c = W.rows; c < W.rows + rows; c++) {
+    for (SolverRow *c = W.rows; c < W.rows + contacts; c++) {
         const SolverBody *a = W.solver_bodies + c->a;
         const Disk *d = W.disks + a->disk;
         if (c->impulse[0] >= NOISE * c->mass[0] * (fabs(d->ux + a->x) + fabs(d->uy + a->y))) continue;

@@ -25,7 +25,7 @@
 /* Times the change at the end of the first round: sweeps that have not crawled to less in the last one
    press harder by as much in each, without end. */
 #define CRAWLS 0.5
-/* m/s on Earth; changes at which sweeps over a few contacts of what has corners or joints end. */
+/* m/s on Earth; changes at which sweeps over a few contacts of what has corners, joints or hinges end. */
 #define FINE_FEW 1e-11
 /* ... and over many, of those of disks: a pile of boxes hangs together by more, and else does not come to rest. */
 #define CROWD_CORNERS 0.3
@@ -87,10 +87,6 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
                     double enough) {
     double first = INFINITY;
     int driven = 0, pressing = 0, lessened = 0, light = W.interact, fine = accurate < W.accurate;
-    if (W.swings_too) {
-        sweep_hung(list, count, MAX(rounds, 1) * sweeps, enough);
-        return;
-    }
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         driven |= drives(c);
@@ -279,7 +275,7 @@ void solve_contacts(int again) {
         }
         double accurate = W.accurate;
         int sweeps = W.sweeps;
-        if ((cornered || tied) && to - from <= FEW_CONTACTS) accurate = FINE_FEW * W.pace;
+        if ((cornered || tied || W.swings_too) && to - from <= FEW_CONTACTS) accurate = FINE_FEW * W.pace;
         else if (cornered) {
             accurate = CROWD_CORNERS * accurate;
             if (stirred) sweeps = (int)(FEWER * sweeps);

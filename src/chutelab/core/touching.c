@@ -89,22 +89,23 @@ static double closes(const Contact *c, double aim, double h) {
     return need;
 }
 
-/* Add a contact if it touches and hardly approaches, of what has corners at a place; `least` is the smaller radius. */
-static int add(int i, int j, double least, double bound, double h, const Touch *place) {
+/* Add a contact if it touches and hardly approaches, of what has corners at a place, or as it was; `least` is the smaller
+   radius. */
+static int add(int i, int j, double least, double bound, double h, const Touch *place, const Contact *still) {
     if (W.contact_count >= W.contact_room) return 0;
     Contact *c = W.contacts + W.contact_count;
     const Disk *d = W.disks + i;
     double u[3], later, haste = 0;
-    if (j < 0 && !place && face_at(surface_at(-1 - j, d->t), d->x, d->y) != W.surfaces + (-1 - j)) return 1;
+    if (j < 0 && !place && !still && face_at(surface_at(-1 - j, d->t), d->x, d->y) != W.surfaces + (-1 - j)) return 1;
     if (j < 0) haste = 2 * h * hastes(W.surfaces + (-1 - j), d);
-    if (place) {
-        describe_touch(c, i, j, place);
-        haste += 2 * h * (whirl_of(d) + (j < 0 ? 0 : whirl_of(W.disks + j)));
-    } else describe(c, i, j);
+    if (still) go_on_with(c, still, h);
+    else if (place) describe_touch(c, i, j, place);
+    else describe(c, i, j);
+    if (place || still) haste += 2 * h * (whirl_of(d) + (j < 0 ? 0 : whirl_of(W.disks + j)));
     /* The next face or pulley that a disk by itself slides on to may be further off. */
-    int far = c->gap > TOUCH * least;
+    int far = c->gap > TOUCH * least, cornered = place || still;
     if (far && (W.interact || j >= 0 || !d->supports)) return 1;
-    later = c->free_gap = place ? place->later : gap_later(c, h, 0);
+    later = c->free_gap = still ? c->free_gap : place ? place->later : gap_later(c, h, 0);
     c->bend = 0;
     if (far && later > 0) return 1;
     relative(c, 0, u);
@@ -113,8 +114,8 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     /* What has sunk in counts however it moves: else what parts others would press it, or what knocks
        on it in each step. */
     double cohesion = cohesion_of(i, j);
-    const Contact *last = place ? place_before(c) : 0;
-    for (int k = place ? -1 : d->before; k >= 0; k = W.earlier[k].next)
+    const Contact *last = place ? place_before(c) : still;
+    for (int k = cornered ? -1 : d->before; k >= 0; k = W.earlier[k].next)
         if (goes_on(W.earlier[k].j, j)) last = W.earlier + k;
     /* N s; what cohesion has held since the step before: of a new contact, what it would have held since the
        latest blow or release. */
@@ -138,6 +139,11 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     c->need = (aim - later) / h;
     c->parts = (aim - closed) / h;
     c->drift = 0.5 * h * c->pull;
+    if (cornered && W.g == 0) {
+        /* Without weight nothing hops by more than it fell: what it would begin with is given by nothing. */
+        c->need = MIN(c->need, c->parts + MAX(-2 * u[0], 0));
+        c->drift = MIN(MAX(c->drift, -fabs(u[1])), fabs(u[1]));
+    }
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     for (int n = 0; n < 3 && last; n++) c->impulse[n] = W.again * last->impulse[n];
     c->frozen = place ? 0 : find_frozen(i, j);
@@ -145,7 +151,7 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     int was_pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
        above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
-    double floor = -u[0], until = j < 0 && !place ? time_on_face(c) : INFINITY, least_need = floor;
+    double floor = -u[0], until = j < 0 && !cornered ? time_on_face(c) : INFINITY, least_need = floor;
     if (until < h) {
         const Surface *s = surface_at(-1 - j, d->t);
         double press = press_on(d, s, c->nx, c->ny), v[3];
@@ -164,7 +170,7 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     double wears = W.interact || ends ? INFINITY : time_unloaded(track->load, track->load_t) - W.t;
     /* In a corner the other surface may press it on this one. */
     int alone = d->supports <= 1 || gone;
-    c->leaves = was_pressed && !place && cohesion == 0 && alone && wears > 3 * h && c->gap <= LEAVE * least && c->need < least_need;
+    c->leaves = was_pressed && !cornered && cohesion == 0 && alone && wears > 3 * h && c->gap <= LEAVE * least && c->need < least_need;
     if (c->leaves || gone) {
         c->gives = c->parts = 0;
         c->most = INFINITY;
@@ -174,7 +180,7 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
         c->drift = (until < h ? until : 0) * c->pull;
     } else if (gone) c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     else if (was_pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
-    if (j < 0 && W.interact && !place && !gone && !c->leaves) {
+    if (j < 0 && W.interact && !cornered && !gone && !c->leaves) {
         follow(c, last ? W.length_before : 0, chord(c, aim - closed, h));
         if (c->turns > 0) c->need = closes(c, aim, h);
     }
@@ -234,42 +240,47 @@ static void carry_to_end(int i, int first, double h) {
     last->need += 0.5 * MAX(press, 0) * until;
 }
 
-/* Add a contact at each place at which a particle with corners touches j. */
-static RARELY int add_places(int i, int j, double bound, double h, const Touch *places, int count) {
-    for (int n = 0; n < count; n++)
-        if (!add(i, j, inner_of(i, j), bound, h, places + n)) return 0;
+/* The places at which a particle with corners touches something, as they are now, or still are. */
+typedef struct { Touch now[MOST_TOUCHES]; const Contact *still[MOST_TOUCHES]; int count, are_still; } Places;
+
+/* Add a contact at each. */
+static RARELY int add_places(int i, int j, double bound, double h, const Places *at) {
+    for (int n = 0; n < at->count; n++)
+        if (!add(i, j, inner_of(i, j), bound, h, at->are_still ? 0 : at->now + n, at->are_still ? at->still[n] : 0)) return 0;
     return 1;
 }
 
-/* List these places, as they are now, for a step of a length h; return how many. */
-static int list_places(int i, int j, double h, Touch *places) {
-    return list_touches(i, j, W.t, TOUCH * inner_of(i, j), W.t + h, places);
+/* List them for a step of a length h; return how many. */
+static int list_places(int i, int j, double h, Places *at) {
+    at->count = at->are_still = list_still(i, j, h, at->still);
+    if (!at->count) at->count = list_touches(i, j, W.t, TOUCH * inner_of(i, j), W.t + h, at->now);
+    return at->count;
 }
 
 /* List the contacts of the step, waking sleepers that are touched; 0 if there is no room. */
 int find_contacts(double h, int *woke) {
-    Touch places[MOST_TOUCHES];
+    Places places;
     W.contact_count = 0;
     *woke = 0;
     for (int n = 0; n < W.near_count; n++) {
-        int i = W.near[2 * n], j = W.near[2 * n + 1], touches = 0, cornered = is_cornered(i, j);
+        int i = W.near[2 * n], j = W.near[2 * n + 1], cornered = is_cornered(i, j);
         if (cornered && !W.disks[i].corners) { int k = i; i = j; j = k; }
         Disk *a = W.disks + i, *b = W.disks + j;
         double least = MIN(a->radius, b->radius), reach = a->radius + b->radius + TOUCH * least;
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
-        if (cornered && !(touches = list_places(i, j, h, places))) continue;
+        if (cornered && !list_places(i, j, h, &places)) continue;
         /* What the step before left over is taken up here. */
         int impacts = MAX(a->impacts, b->impacts);
         double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least, 0);
         if (cornered) bound = MAX(bound, left_over(b, impacts, -1, least, 0));
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
-            bound = MAX(bound, MAX(W.soft, cornered ? 0 : W.skip * least));
+            bound = MAX(bound, cornered ? (W.earlier_count > FEW_CONTACTS ? LATEST : 1) * W.soft : MAX(W.soft, W.skip * least));
         if (cornered && (a->mode == ASLEEP || b->mode == ASLEEP)) {
             wake(a->mode == ASLEEP ? i : j, W.t);
             *woke = 1;
         }
         if (a->mode != FREE && !cornered) { int k = i; i = j; j = k; }
-        if (cornered ? !add_places(i, j, bound, h, places, touches) : !add(i, j, least, bound, h, 0)) return 0;
+        if (cornered ? !add_places(i, j, bound, h, &places) : !add(i, j, least, bound, h, 0, 0)) return 0;
     }
     if (*woke) return 1;
     for (EACH_LIVE(i)) {
@@ -286,8 +297,8 @@ int find_contacts(double h, int *woke) {
             double inside = pressed_inside(d, k), most = MAX(bound, inside ? W.soft + 2 * h * inside : 0);
             if (d->supports && W.stirs) most += 2 * h * hastes(surface_at(k, d->t), d);
             if (has_corners(d)) most = MAX(most, left_over(d, d->impacts, k, d->radius, 0));
-            int touches = has_corners(d) ? list_places(i, -1 - k, h, places) : 0;
-            if (has_corners(d) ? !add_places(i, -1 - k, most, h, places, touches) : !add(i, -1 - k, d->radius, most, h, 0)) return 0;
+            if (has_corners(d)) list_places(i, -1 - k, h, &places);
+            if (has_corners(d) ? !add_places(i, -1 - k, most, h, &places) : !add(i, -1 - k, d->radius, most, h, 0, 0)) return 0;
         }
         if (W.contact_count > first && !has_corners(d)) carry_to_end(i, first, h);
         for (Contact *c = W.contacts + first; W.interact && c < W.contacts + W.contact_count; c++) {

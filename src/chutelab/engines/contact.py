@@ -315,4 +315,5 @@ class Job:
         if world.total_count:
             recorder.take_totals(module.array("totals", dtype("Total"), world.total_count))
         recorder.impulses = gather(module, self.owners)
-        recorder.lasting = gather_lasting(module)
+        if module.structs["Loads"].each:
+            recorder.lasting = gather_lasting(module)

@@ -115,7 +115,8 @@ def judged(
         raise ValueError(f"max_seconds = {max_seconds!r}: a finite number above 0 s")
 
     scene, cut = load(scene, changes), list[BaseException]()
-    with ctrl_c_waits() as interrupted:
+    lone = scene.count == 1
+    with ctrl_c_waits(lazily=lone) as interrupted:
 
         def look() -> None:
             interrupted()
@@ -126,7 +127,8 @@ def judged(
             try:
                 if progress is not None:
                     progress(share)
-                look()
+                if share < 1.0 or not lone:
+                    look()
             except EnoughError:
                 raise
             except BaseException as error:

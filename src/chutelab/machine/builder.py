@@ -163,8 +163,9 @@ def hand_over(module: Module, scene: Scene) -> None:
     plan = module.structs["Plan"]
     for name, size in sizes.items():
         setattr(plan, name, size)
-    module.work("lay_out_plan")
-    module.fill("Plan", rows=numbers)
+    if not module.begin_with(numbers):
+        module.work("lay_out_plan")
+        module.fill("Plan", rows=numbers)
 
 
 def lay(
@@ -289,6 +290,10 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         begin, second = one.from_ or getattr(one, "over", None), one.other
         joint = Joint(table, one.particle, 0.0, begin, -1 if second is None else second, **own)
         rest = getattr(one, "length", None) or joint.reach(releases.position)
+        if rest < NEAR and table in ("string", "rod"):
+            key, n = "from" if one.from_ else "other", getattr(scene, table).index(one)
+            fault = Fault(f"{table}[{n}].{key}", one.from_ or one.other, ONE_PLACE)
+            raise RefusedError(scene.source, {0: fault})
         joints.append(replace(joint, length=rest))
     triggers = tuple(
         Trigger(names.index(name), doing, names.index(by)) for name, doing, by in scene.triggers
@@ -426,6 +431,11 @@ def _particle(scenes: Scene | Family, kind: Ints, radius: Floats | None) -> Part
     cube = square * size
     return Particle(radius, mass * cube, inertia * (cube * square))
 
+
+NEAR = 1e-9
+"""m; a string or a rod is at least so long."""
+
+ONE_PLACE = "another place than the particle's at the release; a [[pin]] joins what is in one place"
 
 SWIFTEST = 1e5
 """rad/s; shortest times of hinges are at least 1 over it: steps have to be shorter."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from chutelab.machine import Arcs, Machine, Pieces, Segments
 from chutelab.results.record import EVENT, PARTICLES, Kind, Record, hermite, kept, turned
-from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.util.arrays import Bools, Floats, Ints, put
 
 TOUCH = 0.01
 """Gap, as a share of the smaller radius, up to which two touch: twice what the contact engine
@@ -157,7 +157,7 @@ def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
     direct = recording.select(surface=surface)
     if not recording.machine.interact:
         own = recording.first(direct)
-        found[own["particle"]] = own
+        put(found, own["particle"], own)
         return found
     there = Places(recording)
     met = np.concatenate([direct, recording.select(Kind.COLLISION)])

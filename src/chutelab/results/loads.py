@@ -51,8 +51,6 @@ def gather(module: Module, surfaces: int) -> NDArray[np.void]:
 def gather_lasting(module: Module) -> NDArray[np.void]:
     """Return what lasting contacts gave in the core's contact engine, (C,)."""
     told: Any = module.structs["Loads"]
-    if not told.each:
-        return np.empty(0, LASTING)
     if told.overflow:
         raise InputError("so long that all bins have room in memory", "run.stress", told.each)
     rows = module.array("lasting", dtype("Lasting"), told.lasting_count, of="Loads")

@@ -33,7 +33,7 @@ from chutelab.scene.units import with_unit
 from chutelab.scene.variants import Family
 from chutelab.theory import Transfer, predict, unbounded
 from chutelab.theory.prediction import outside
-from chutelab.util.arrays import Bools, Floats, Numbers
+from chutelab.util.arrays import Bools, Floats, Numbers, put, sorted_by
 from chutelab.util.tables import Sheet, Shown, number
 
 ALONG = 1e-14
@@ -50,7 +50,7 @@ def first(recording: Record, event: str, surface: str | None = None) -> NDArray[
     surface, events = surface or NEEDED[event], never(recording.count)
     if surface in recording.surfaces:
         found = recording.first(recording.select(event, surface=surface))
-        events[found["particle"]] = found
+        put(events, found["particle"], found)
     return events
 
 
@@ -326,13 +326,13 @@ def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
     known &= events["surface"] == recording.surface_index("incoming")
     known |= events["particle"] % each > 0
     order = (np.isin(events["kind"], kinds) & ~known).nonzero()[0]
-    own = events.take(order[np.argsort(events["particle"][order], kind="stable")])
+    own = events.take(order[sorted_by(events["particle"][order], recording.count)])
     own["particle"] //= each
     place = np.arange(len(own)) - np.searchsorted(own["particle"], own["particle"])
     found = []
     for n in range(len(NEEDED)):
         at, one = place == n, never(len(holds))
-        one[own["particle"][at]] = own[at]
+        put(one, own["particle"][at], own.take(at.nonzero()[0]))
         found.append(one)
     # An impact that throws a carried particle off the belt is no separation of the theory.
     holds = holds & ~(found[0]["t"] >= found[1]["t"])

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from chutelab.machine import SWING, Machine
 from chutelab.results.loads import Bins
 from chutelab.results.record import EVENT, KNOT, LASTING, LOAD, REASONS, TOTAL, Kind, Record
-from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.util.arrays import Bools, Floats, Ints, put, sorted_by
 
 
 class StalledError(RuntimeError):
@@ -126,6 +126,10 @@ def moved(machine: Machine, x: float, y: float) -> Machine:
     )
 
 
+NOTHING = np.zeros(0)
+"""Numbers that a run does not have."""
+
+
 class Recorder:
     """Grows by chunks; `finish` turns it into a frozen `Record` of the machine's run.
 
@@ -133,6 +137,12 @@ class Recorder:
     from `origin`, m, see the function: engines run `near`, the machine moved there;
     `turned` so that gravity is straight down, if they know it so alone.
     """
+
+    # What few runs have; never changed in place.
+    swings, springs = np.empty(0, SWING), np.zeros((0, 4))
+    stopped = unsolved = triggered = NOTHING
+    totals, lasting = np.empty(0, TOTAL), np.empty(0, LASTING)
+    impulses = np.empty((0, 0), LOAD)
 
     def __init__(self, machine: Machine, *, apart: bool = False, turned: bool = False) -> None:
         self.machine, self.origin, self.near = machine, (0.0, 0.0), machine
@@ -146,16 +156,11 @@ class Recorder:
         self.entries = np.zeros((count, 3))
         self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))
         self.ended = np.zeros(count, dtype=np.int8)
-        self.drives = np.zeros(owners)
-        self.swings = np.empty(0, SWING)
-        self.hinge_work, self.stopped = np.zeros((owners, 4)), np.zeros(0)
-        self.springs = np.zeros((0, 4))
-        self.triggered = np.full(len(machine.triggers), np.inf)
+        self.drives, self.hinge_work = np.zeros(owners), np.zeros((owners, 4))
         self.contacts = 0
         self.gained = self.air_loss = 0.0
-        self.totals, self.unsolved = np.empty(0, TOTAL), np.empty(0)
-        self.impulses = np.empty((0, 0), LOAD)
-        self.lasting = np.empty(0, LASTING)
+        if machine.triggers:
+            self.triggered = np.full(len(machine.triggers), np.inf)
         # Of engines that count loads here, if these are asked for.
         self.bins = Bins(machine) if machine.loads else None
         self._knots: list[NDArray[Any]] = []
@@ -195,11 +200,11 @@ class Recorder:
 
     def take_events(self, packed: NDArray[np.uint8]) -> None:
         """Add events as the core hands them over: the bytes of rows of `EVENT`, kept no longer."""
-        self._events.append(packed.view(EVENT))
+        self._events.append(np.frombuffer(packed, EVENT))
 
     def take_totals(self, rows: NDArray[Any]) -> None:
         """Take what the core has of all steps, dtype ``Total``."""
-        self.totals = _items(rows, "t", TOTAL.itemsize).copy().view(TOTAL)
+        self.totals = np.frombuffer(bytearray(rows.getfield(f"V{TOTAL.itemsize}").tobytes()), TOTAL)
         self.unsolved = rows["unsolved"].copy()
 
     def book(
@@ -257,13 +262,12 @@ class Recorder:
         count = len(self.ended)
         owners = _joined(self._owners, np.dtype(np.int64))
         place = None
-        if np.count_nonzero(owners[1:] < owners[:-1]):
-            # Numbers of two bytes are sorted five times as fast.
-            order = np.argsort(owners.astype(np.min_scalar_type(count)), kind="stable")
+        if count > 1 and np.count_nonzero(owners[1:] < owners[:-1]):
+            order = sorted_by(owners, count)
             place, owners = np.empty_like(order), owners.take(order)
             place[order] = np.arange(len(order))
         knots = _joined(self._knots, KNOT, place)
-        angle = _joined(self._angles, np.dtype(float), place)
+        angle = _joined(self._angles, np.dtype(float), place) if self._angular else NOTHING
         if self.machine.interact:
             # Of several blows at one instant the states between them are dropped.
             same = (np.diff(knots["t"]) == 0.0) & (np.diff(owners) == 0)
@@ -271,23 +275,21 @@ class Recorder:
                 kept = ~np.concatenate([[False], between, [False]])
                 knots, owners = knots[kept], owners[kept]
                 angle = angle[kept] if self._angular else angle
-        sizes = np.bincount(owners, minlength=count)
-        offsets = np.zeros(count + 1, dtype=np.int64)
-        sizes.cumsum(out=offsets[1:])
-        ended = self.ended.copy()
-        if np.count_nonzero(sizes) < count:
+        offsets, ended = np.array([0, len(knots)]), self.ended
+        if count > 1 or len(knots) < 2:
+            sizes = np.bincount(owners, minlength=count)
+            offsets = np.append(0, sizes.cumsum())
             ended[(sizes == 0) & (ended == REASONS.index("time"))] = REASONS.index("unreleased")
-        lonely = (sizes == 1).nonzero()[0]
-        if len(lonely):
             # A track needs two knots: a single one is doubled.
-            if self._angular:
-                angle = np.insert(angle, offsets[lonely], angle[offsets[lonely]])
-            knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])
-            np.cumsum(np.where(sizes == 1, 2, sizes), out=offsets[1:])
+            if len(lonely := (sizes == 1).nonzero()[0]):
+                if self._angular:
+                    angle = np.insert(angle, offsets[lonely], angle[offsets[lonely]])
+                knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])
+                np.cumsum(np.where(sizes == 1, 2, sizes), out=offsets[1:])
         one = len(self._events) == 1
         events = _joined(self._events, EVENT)
         t = events["t"]
-        if count > 1 or np.count_nonzero(t[1:] < t[:-1]):
+        if count > 1 or (times := t.tolist()) != sorted(times):
             # At one time by particle, then as they came.
             t, particle = t.copy(), events["particle"].copy()
             in_turn = not np.count_nonzero(particle[1:] < particle[:-1])
@@ -295,7 +297,7 @@ class Recorder:
             events = events.take(order)
         elif one:
             # It may lie in the core.
-            events = events.copy()
+            events = np.frombuffer(bytearray(events.tobytes()), EVENT)
         if self._turned:
             knots, frame = knots.copy(), self.machine.frame
             for rows in (knots, events, *[self.impulses][: self.impulses.size]):
@@ -305,13 +307,15 @@ class Recorder:
             knots = knots.copy()
             for rows in (knots, events):
                 rows["position"] += self.origin
-            begun = knots["t"][offsets[:-1][sizes > 0]]
+        if any(self.origin) and len(self.totals):
+            released = offsets[1:] > offsets[:-1]
+            begun = knots["t"][offsets[:-1][released]]
             order = np.argsort(begun, kind="stable")
-            mass = np.broadcast_to(self.machine.particle.mass, count)[sizes > 0][order]
+            mass = np.broadcast_to(self.machine.particle.mass, count)[released][order]
             weight = np.concatenate([[0.0], mass.cumsum()]) * self.machine.gravity
             lifted = weight * self.machine.height(np.array(self.origin))
-            released = np.searchsorted(begun[order], self.totals["t"], side="left")
-            self.totals["potential"] += lifted[released]
+            before = np.searchsorted(begun[order], self.totals["t"], side="left")
+            self.totals["potential"] += lifted[before]
         if self.impulses.size:
             if any(self.origin):
                 (x, y), force = self.origin, self.impulses["force"]
@@ -329,8 +333,8 @@ class Recorder:
             offsets=offsets,
             ended=ended,
             events=events,
-            by_surface=self.by_surface.copy(),
-            drives=self.drives if self.machine.movers or len(self.swings) else np.zeros(0),
+            by_surface=self.by_surface,
+            drives=self.drives if self.machine.movers or len(self.swings) else NOTHING,
             swings=self.swings,
             triggered=self.triggered,
             stopped=self.stopped,
@@ -348,16 +352,17 @@ class Recorder:
         )
 
 
+_ITEM = np.dtype(f"V{KNOT.itemsize}")
+"""A knot as bytes, which are copied whole."""
+
+
 def read_knots(rows: NDArray[Any]) -> tuple[Ints, NDArray[Any], Floats]:
-    """Return what `Recorder.add` takes of knots as the core writes them, dtype ``Knot``: copies."""
-    own = _items(rows, "t", KNOT.itemsize).copy().view(KNOT)
+    """Return what `Recorder.add` takes of knots as the core writes them, dtype ``Knot``: copies.
+
+    Such a row begins with one of `KNOT`.
+    """
+    own = np.frombuffer(rows.getfield(_ITEM).tobytes(), KNOT)
     return rows["disk"].astype(np.int64), own, rows["angle"].copy()
-
-
-def _items(rows: NDArray[Any], name: str, size: int) -> NDArray[Any]:
-    """Return a field and what follows it, so many bytes in all, as items that are copied whole."""
-    begin = rows.dtype.fields[name][1]  # type: ignore[index]
-    return np.ndarray(len(rows), f"V{size}", rows, begin, rows.strides)
 
 
 def _joined(
@@ -371,9 +376,9 @@ def _joined(
         return chunks.pop()
     whole = np.empty(sum(map(len, chunks)), dtype=dtype)
     if place is not None:
-        items, begin = whole.view(f"V{dtype.itemsize}"), 0
+        begin = 0
         for chunk in chunks:
-            np.put(items, place[begin : begin + len(chunk)], chunk.view(items.dtype))
+            put(whole, place[begin : begin + len(chunk)], chunk)
             begin += len(chunk)
     elif len(whole):
         np.concatenate([chunk.view(np.uint8) for chunk in chunks], out=whole.view(np.uint8))

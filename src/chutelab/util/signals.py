@@ -114,20 +114,23 @@ def held() -> Iterator[None]:
 
 
 @contextmanager
-def ctrl_c_waits() -> Iterator[Callable[[], None]]:
+def ctrl_c_waits(*, lazily: bool = False) -> Iterator[Callable[[], None]]:
     """Give a function that raises what a Ctrl-C would have raised before.
 
     So a run is interrupted where it can be, and keeps what it has. One that comes `GRACE` after the
     first is obeyed at once. In a thread, and where there is another handler, nothing changes. The
     function also raises again what `raised` has raised: work that goes on shows that some code
-    which catches everything, an import say, has lost it.
+    which catches everything, an import say, has lost it. With `lazily` nothing waits before the
+    function is called: what is over sooner needs no handler.
     """
     came: list[float] = []
-    before = signal.getsignal(signal.SIGINT)
-    told = False
+    before: Any = None
+    told = looked = changed = False
 
     def look() -> None:
         nonlocal told
+        if not looked:
+            wait()
         if came and callable(before):
             came.clear()
             told = True
@@ -141,11 +144,16 @@ def ctrl_c_waits() -> Iterator[Callable[[], None]]:
             before(signum, frame)
         came.append(monotonic())
 
-    changed = False
-    if before in (signal.default_int_handler, _obey):
-        with suppress(ValueError):
-            signal.signal(signal.SIGINT, note)
-            changed = True
+    def wait() -> None:
+        nonlocal before, looked, changed
+        before, looked = signal.getsignal(signal.SIGINT), True
+        if before in (signal.default_int_handler, _obey):
+            with suppress(ValueError):
+                signal.signal(signal.SIGINT, note)
+                changed = True
+
+    if not lazily:
+        wait()
     try:
         yield look
     finally:

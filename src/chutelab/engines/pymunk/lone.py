@@ -166,8 +166,8 @@ class Lone:
                 ahead = (t for face in every for t in (face.appears, face.vanishes))
                 self.changes = min(t for t in (*ahead, inf) if t > self.t)
             touching, room = {}, inf
-            for face in self.faces:
-                gap, normal = face.gap(self.x)
+            near = {face: face.gap(self.x) for face in self.faces}
+            for face, (gap, normal) in near.items():
                 if gap <= 0.5 * self.world.hair:
                     touching[face] = normal
                 else:
@@ -176,19 +176,15 @@ class Lone:
             if any(self.v.dot(normal) < -slow for normal in touching.values()):
                 self._blow(touching)
             elif released or not self._ride(touching, room):
-                self._fly(touching)
+                self._fly(touching, near)
             released = False
             rounds += 1
             if self.t - begin >= GAINED * self.dt:
                 begin, done, rounds = self.t, self.steps, 0
-            elif self.steps - done + rounds > WINDOW and not self.ended:
-                self._end("time")
-                raise StalledError(
-                    self.particle, self.t, (self.x.x, self.x.y),
-                    f"{WINDOW} steps gain less than {GAINED} times run.dt: it goes to and fro, or"
-                    " round, in a narrow place; move the surfaces there apart, lower their"
-                    " restitution, or take another engine",
-                )  # fmt: skip
+            elif self.blows > 2 * TURNS:
+                self._stall("its blows never end")
+            elif self.steps - done + rounds > WINDOW:
+                self._stall(f"{WINDOW} steps gain less than {GAINED} times run.dt")
         self.world.space.remove(self.body, self.circle)
         self._look()
 
@@ -202,6 +198,17 @@ class Lone:
             if not self.ended:
                 self._end("stopped")
             raise
+
+    def _stall(self, why: str) -> None:
+        """Raise a `StalledError`, unless the track has ended."""
+        if self.ended:
+            return
+        self._end("time")
+        raise StalledError(
+            self.particle, self.t, (self.x.x, self.x.y),
+            f"{why}: it goes to and fro, or round, in a narrow place; move the surfaces there"
+            " apart, lower their restitution, or take another engine",
+        )  # fmt: skip
 
     # Chipmunk
 
@@ -270,7 +277,7 @@ class Lone:
 
     # Flight and blows
 
-    def _fly(self, touching: dict[Face, Vec2d]) -> None:
+    def _fly(self, touching: dict[Face, Vec2d], near: dict[Face, tuple[float, Vec2d]]) -> None:
         """Fly to the next contact, the exit or the end."""
         if self.on >= 0:
             self._knot()
@@ -286,7 +293,7 @@ class Lone:
             if (clear := self.world.clear(path, face, span)) < span:
                 span, reason = clear, ""
         for face in self.faces:
-            met = self.world.meets(path, face, span, face in touching)
+            met = self.world.meets(path, face, span, face in touching, near=near[face])
             if met < span:
                 span, reason = met, ""
         if span > 0.0:

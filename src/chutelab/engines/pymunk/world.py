@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import acos, atan2, ceil, cos, inf, pi, sin, sqrt
+from math import acos, atan2, ceil, cos, dist, inf, pi, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -356,7 +358,7 @@ class World:
         more = sqrt(2.0 * JOINT * self.hair * float(arcs.radius.min())) / (radius + self.radius)
         # Where another piece goes on from the end, turning by less than that.
         before, after = (
-            more if (np.hypot(*(self._from(end)[0] + inward).T) <= more).any() else 0.0
+            more if (np.hypot(*(self._from(end.tolist())[0] + inward).T) <= more).any() else 0.0
             for end, inward in ends
         )
         self._add(Bend(
@@ -364,9 +366,10 @@ class World:
             crowns=NONE, **about,
         ))  # fmt: skip
         # Out of it is along the surface at the first end, against it at the last.
-        for (end, inward), way in zip(ends, (1.0, -1.0), strict=True):
+        for (place, inward), way in zip(ends, (1.0, -1.0), strict=True):
+            end = place.tolist()
             still = pymunk.Body(body_type=pymunk.Body.STATIC)
-            point = pymunk.Circle(still, 0.0, end.tolist())
+            point = pymunk.Circle(still, 0.0, end)
             out = Vec2d(*(-inward).tolist())
             crown = self._crown(end, out, way / radius) if about["speed"] else out.perpendicular()
             self._add(Face(
@@ -375,8 +378,8 @@ class World:
             ))  # fmt: skip
 
     @cached_property
-    def _onward(self) -> tuple[Floats, Floats, Floats]:
-        """Ends of all pieces from left to right, (n, 2), m, and the ways on into each.
+    def _onward(self) -> tuple[list[list[float]], Floats, Floats]:
+        """Ends of all pieces from left to right, n of [x, y], m, and the ways on into each.
 
         These are directions, (n, 2), and curvatures, (n,), 1/m, > 0 to the left.
         """
@@ -387,17 +390,16 @@ class World:
         ]
         ends, ways, bends = (np.concatenate(each) for each in zip(*sides, strict=True))
         order = ends[:, 0].argsort(kind="stable")
-        return ends[order], ways[order], bends[order]
+        return ends[order].tolist(), ways[order], bends[order]
 
-    def _from(self, end: ArrayLike) -> tuple[Floats, Floats]:
+    def _from(self, end: Sequence[float]) -> tuple[Floats, Floats]:
         """Return the ways on, as of `_onward`, into all pieces that end in a place (m)."""
-        ends, ways, bends = self._onward
-        place = np.asarray(end)
-        low, high = ends[:, 0].searchsorted([place[0] - self.hair, place[0] + 1.01 * self.hair])
-        near = np.hypot(*(ends[low:high] - place).T) <= self.hair
-        return ways[low:high][near], bends[low:high][near]
+        (ends, ways, bends), (x, y) = self._onward, end
+        low, high = (bisect_left(ends, [x + share * self.hair]) for share in (-1.0, 1.01))
+        near = [n for n in range(low, high) if dist(ends[n], (x, y)) <= self.hair]
+        return ways[near], bends[near]
 
-    def _crown(self, end: ArrayLike, out: Vec2d, bend: float = 0.0) -> Vec2d:
+    def _crown(self, end: Sequence[float], out: Vec2d, bend: float = 0.0) -> Vec2d:
         """Return the way to the middle of the half of an end's rim that goes on from a left side.
 
         That is the side of the way out of a piece, which bends by so much (1/m) on the way back. At
@@ -453,20 +455,21 @@ class World:
 
     def meets(
         self, path: Flight | Carriage, face: Face, span: float, leaving: bool = False,
-        begin: float = 0.0,
+        begin: float = 0.0, near: tuple[float, Vec2d] | None = None,
     ) -> float:  # fmt: skip
         """Return after what time (s) a disk on a path meets a surface, inf if not within `span`.
 
         It goes on by the times in which surely nothing is met, see `Face.free`: that never passes a
         contact, and converges like Newton's method. A surface that is being left along its tangent
-        gives no bound; it is looked at after times that grow by half.
+        gives no bound; it is looked at after times that grow by half. `near` is its gap and normal
+        where the path begins, if they are known.
         """
         r, g, hair = face.radius, self.machine.gravity, self.hair
         t = last = begin
         while True:
             x, v = path.at(t)
-            gap, normal = face.gap(x)
-            rate = v.dot(normal)
+            gap, normal = near or face.gap(x)
+            near, rate = None, v.dot(normal)
             slow = self.tiny * (self.pace + v.length)
             if leaving:
                 if gap < -hair and t > 0.0:

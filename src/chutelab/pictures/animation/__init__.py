@@ -11,7 +11,7 @@ pixels that changed. Videos, mp4 or webm, go through imageio and its ffmpeg.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from itertools import combinations
@@ -24,7 +24,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw
+from PIL.GifImagePlugin import getdata, getheader
 
 from chutelab.pictures import PURPLE
 from chutelab.pictures.animation.actors import (
@@ -248,20 +250,27 @@ class Stage:
             self.writings += column
         self.canvas.draw()
         self._background = self.canvas.copy_from_bbox(self.figure.bbox)
+        # Pillow writes where Matplotlib has drawn.
+        self._pixels = np.asarray(self.canvas.buffer_rgba())
+        size = self.canvas.get_width_height()
+        shared = Image.frombuffer("RGBA", size, self._pixels, "raw", "RGBA", 0, 1)
+        shared.readonly = 0
+        self._draw = ImageDraw.Draw(shared)
 
-    def frame(self, index: int) -> Image.Image:
-        """Return the picture of one moment, RGB."""
+    def paint(self, index: int) -> NDArray[np.uint8]:
+        """Draw one moment; return its pixels, (H, W, 4), RGBA: until the next is drawn."""
         self.canvas.restore_region(self._background)
         renderer = self.canvas.get_renderer()
         for artist, show in self.moving:
             show(index)
             artist.draw(renderer)
-        size = self.canvas.get_width_height()
-        picture = Image.frombytes("RGB", size, self.canvas.buffer_rgba(), "raw", "RGBX")
-        draw = ImageDraw.Draw(picture)
         for writing in self.writings:
-            writing.paint(draw, index)
-        return picture
+            writing.paint(self._draw, index)
+        return self._pixels
+
+    def frame(self, index: int) -> Image.Image:
+        """Return the picture of one moment, RGB."""
+        return Image.fromarray(self.paint(index)).convert("RGB")
 
     def _add_text(self, layout: Layout, pace: str, moments: tuple[Moment, ...]) -> list[Writing]:
         """Write title, question and pace; return clock and caption, which change."""
@@ -401,32 +410,77 @@ def palette() -> tuple[str, ...]:
     return tuple(dict.fromkeys([*greys, *hues, *flat, *edges, *meeting, *dark]))
 
 
-def write_gif(
-    path: Path, pictures: Iterable[Image.Image], delays: Iterable[int], comment: str = ""
-) -> None:
-    """Write RGB pictures of one size as a GIF that loops for ever.
+class Colours:
+    """Which of the few colours of `palette` each pixel is shown in."""
 
-    Each stays for its delay in hundredths of a second; equal ones in a row become one frame. Pillow
-    keeps a byte for each of their pixels until all are drawn. The comment is kept, not shown.
+    def __init__(self) -> None:
+        self.table = b"".join(bytes.fromhex(colour[1:]) for colour in palette())
+        self.reference = Image.new("P", (1, 1))
+        self.reference.putpalette(self.table)
+        # Of the upper six bits of red, green and blue, on which it depends, as Pillow says it.
+        self.known = np.full(1 << 18, -1, dtype=np.int16)
+
+    def of(self, pixels: NDArray[np.uint32]) -> NDArray[np.uint8]:
+        """Return the numbers of the colours of pixels (n,), RGBA."""
+        keys = (pixels >> 2 & 0x3F) | (pixels >> 4 & 0xFC0) | (pixels >> 6 & 0x3F000)
+        new = np.unique(keys[self.known[keys] < 0])
+        if len(new):
+            parts = [(new >> shift & 0x3F) << 2 for shift in (0, 6, 12)]
+            some = Image.fromarray(np.stack(parts, axis=-1).astype(np.uint8)[None])
+            few = some.quantize(palette=self.reference, dither=Image.Dither.NONE)
+            self.known[new] = np.asarray(few)[0]
+        found: NDArray[np.uint8] = self.known[keys].astype(np.uint8)
+        return found
+
+
+def write_gif(
+    path: Path, pictures: Iterable[NDArray[np.uint8]], delays: Iterable[int], comment: str = ""
+) -> None:
+    """Write pictures of one size, (H, W, 4), RGBA, as a GIF that loops for ever.
+
+    Each stays for its delay in hundredths of a second; equal ones in a row become one frame. Of
+    each only what changed is looked at, and written. The comment is kept, not shown.
     """
-    table = b"".join(bytes.fromhex(colour[1:]) for colour in palette())
-    reference = Image.new("P", (1, 1))
-    reference.putpalette(table)
-    few = (one.quantize(palette=reference, dither=Image.Dither.NONE) for one in pictures)
-    next(few).save(
-        path,
-        format="GIF",
-        save_all=True,
-        append_images=few,
-        duration=[10 * delay for delay in delays],
-        loop=0,
-        # The table ends with a colour that no pixel has: there the last frame stays to be seen.
-        palette=table + bytes(3),
-        transparency=len(table) // 3,
-        disposal=1,
-        optimize=True,
-        comment=comment,
-    )
+    colours = Colours()
+    # The table ends with a colour that no pixel has: there the last frame stays to be seen.
+    clear = len(colours.table) // 3
+    look: dict[str, Any] = {"transparency": clear, "disposal": 1}
+
+    def frames() -> Iterator[tuple[NDArray[np.uint8], tuple[int, int], int]]:
+        """Yield frames, where each is, and how long it stays."""
+        waits: tuple[NDArray[np.uint8], tuple[int, int]] | None = None
+        stays = 0
+        for picture, delay in zip(pictures, delays, strict=True):
+            now = picture.view("<u4")[..., 0].ravel()
+            if waits is None:
+                shown = colours.of(now)
+                before, waits = now.copy(), (shown.reshape(picture.shape[:2]), (0, 0))
+            else:
+                (changed,) = (now != before).nonzero()
+                before[changed] = now[changed]
+                found = colours.of(now[changed])
+                other = found != shown[changed]
+                changed, found = changed[other], found[other]
+                if len(changed):
+                    yield *waits, stays
+                    shown[changed] = found
+                    y, x = np.divmod(changed, picture.shape[1])
+                    top, left = y.min(), x.min()
+                    frame = np.full((y.max() - top + 1, x.max() - left + 1), clear, dtype=np.uint8)
+                    frame[y - top, x - left] = found
+                    waits, stays = (frame, (int(left), int(top))), 0
+            stays += delay
+        assert waits is not None
+        yield *waits, stays
+
+    with path.open("wb") as file:
+        for frame, place, delay in frames():
+            image = Image.fromarray(frame)
+            if not file.tell():
+                image.putpalette(colours.table + bytes(3))
+                file.writelines(getheader(image, info={"loop": 0, "comment": comment, **look})[0])
+            file.writelines(getdata(image, place, duration=10 * delay, **look))
+        file.write(b";")
 
 
 VIDEOS = {
@@ -564,13 +618,12 @@ def animate(
     crowd = as_crowd(recording) and "velocity" not in layout.shows
     moments = film(recording, begin, end, fps=fps, slow=pace, ask=ask, crowd=crowd)
     stage = Stage(recording, layout, moments, slow=pace, ask=ask)
-    pictures = map(stage.frame, range(len(moments)))
-    delays = [moment.delay for moment in moments]
+    every, delays = range(len(moments)), [moment.delay for moment in moments]
     with whole(path) as unfinished:
         if kind == "gif":
-            write_gif(unfinished, pictures, delays, comment)
+            write_gif(unfinished, map(stage.paint, every), delays, comment)
         else:
-            write_video(unfinished, kind, fps, pictures, delays)
+            write_video(unfinished, kind, fps, map(stage.frame, every), delays)
     return path
 
 

@@ -398,7 +398,12 @@ def bars(
         shape = Rectangle((left, 0.0), 0.8, 0.0, lw=0.0, color=style.ENERGY[name], gid=name)
         shape.set_animated(True)
         ax.add_patch(shape)
-        return shape, lambda index: shape.set_bounds(left, base[index], 0.8, height[index])
+
+        def show(index: int) -> None:
+            shape.set_bounds(left, base[index], 0.8, height[index])
+            shape.set_visible(height[index] > 0.0)
+
+        return shape, show
 
     moving = []
     for left, side in zip((-0.4, 0.6), sides, strict=True):

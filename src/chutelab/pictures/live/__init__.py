@@ -112,7 +112,6 @@ def html(
     script = _file(f"bundle/{'app' if lesson is None else 'lessonpage'}.js")
     large = {
         "script": script,
-        "worker": _file("bundle/worker.js"),
         **{name: facts.pop(name) for name in ("tables", "rules", "presets")},
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
         "strings": {**meanings, **strings},
@@ -131,6 +130,8 @@ def html(
         "live": live,
         "version": own_version(),
         "language": language,
+        # Not packed: the engine's thread begins before all else.
+        "worker": _file("bundle/worker.js"),
         "packed": _packed(json.dumps(large, separators=(",", ":")).encode()),
         "wasm": _packed((core / "page.wasm").read_bytes()),
     }

@@ -37,7 +37,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
-from threading import Thread
+from threading import Event, Thread
 from types import ModuleType
 from typing import Any, Final
 
@@ -77,6 +77,9 @@ ATTEMPTS: Final = 3
 PATIENCE: Final = 10.0
 """s that a scheduler may take to answer."""
 
+
+LETS_GO: Final = 1.0
+"""s, at most, that a pool may take to cancel what it has not begun."""
 
 ADDRESS: Final = re.compile(r"(\w+://)?[^\s:/]+:\d{1,5}")
 """A host and a port."""
@@ -196,7 +199,12 @@ def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
         yield team
     except BaseException:
         if team.executor is not None:
+            # Its thread fails at a job that is cancelled when its process dies: jobs go first.
+            gone = Event()
+            with suppress(RuntimeError), _without_ctrl_c():
+                team.executor.submit(int).add_done_callback(lambda _: gone.set())
             team.executor.shutdown(wait=False, cancel_futures=True)
+            gone.wait(LETS_GO)
         for child in multiprocessing.active_children():
             if child.pid not in others:
                 child.terminate()

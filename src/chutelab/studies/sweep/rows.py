@@ -27,7 +27,7 @@ from chutelab.results.quantities import measured
 from chutelab.results.stream import told_fates
 from chutelab.scene.quantities import COLUMNS, FORMER, HEAT, PAID, REGISTRY, lookup
 from chutelab.scene.variants import Quantity
-from chutelab.util.arrays import Floats
+from chutelab.util.arrays import Floats, sorted_by
 from chutelab.util.errors import InputError, library
 from chutelab.util.files import csv_columns, csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, many, number
@@ -191,6 +191,9 @@ def member(recording: Recording, row: int) -> Recording:
 LONGEST: Final = 6
 """Surfaces that are named: what is thrown to and fro longer goes by the same name."""
 
+FIELDS: Final = "particle", "surface", "kind"
+"""Of an event, by which ways are told."""
+
 NOTHING: Final = "nothing"
 """What a particle touches that meets no surface."""
 
@@ -210,10 +213,10 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
     kind = recording.events["kind"]
     some = (kind == Kind.IMPACT) | (kind == Kind.LANDING) | (kind == Kind.SETTLE)
     order = some.nonzero()[0]
-    order = order[np.argsort(recording.events["particle"][order], kind="stable")]
     # Columns are taken, not rows, which are ten times as large.
-    particle, surface = recording.events["particle"][order], recording.events["surface"][order]
-    lands = kind[order] == Kind.LANDING
+    particle, surface, lands = (recording.events[name][order].astype(np.int64) for name in FIELDS)
+    order = sorted_by(particle, recording.count)
+    particle, surface, lands = particle[order], surface[order], lands[order] == Kind.LANDING
     landings = np.cumsum(lands) - lands
     kept = landings == landings[np.searchsorted(particle, particle)]
     kept[1:] &= (particle[1:] != particle[:-1]) | (surface[1:] != surface[:-1])

@@ -8,12 +8,12 @@ const textOf = (id: string) => document.getElementById(id)?.textContent ?? "";
 /** @returns the page's data, the core, and what makes threads, of which the first has begun */
 async function boot() {
   const data = JSON.parse(textOf("lab"));
+  const source = new Blob([data.worker], { type: "text/javascript" });
+  const newThread = () => new Worker(URL.createObjectURL(source)), thread = newThread();
   const core = compiled(bytesOf(data.wasm).buffer).catch(() => null);
-  const { script, worker, ...more } = await unpacked(bytesOf(data.packed).buffer).json();
-  const source = new Blob([worker], { type: "text/javascript" });
-  const newThread = () => new Worker(URL.createObjectURL(source));
+  const { script, ...more } = await unpacked(bytesOf(data.packed).buffer).json();
   Object.assign(globalThis, {
-    booted: { data: Object.assign(data, more), core, newThread, thread: newThread() },
+    booted: { data: Object.assign(data, more), core, newThread, thread },
   });
   const element = document.createElement("script");
   element.type = "module";

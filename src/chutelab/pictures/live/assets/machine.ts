@@ -198,9 +198,12 @@ function weigh({ inertia, mass, moment: [x, y], spring, damper }: Mover, name: s
 /** Share of its length by which a string may be too short: that is rounding. */
 const TAUT = 1e-9;
 
+/** m; a string or a rod is at least so long. */
+const NEAR = 1e-9;
+
 /**
  * Returns the joints, each as long as it is at the release unless its length is given.
- * @throws {Fault} if a string is shorter than that
+ * @throws {Fault} if a string is shorter than that, or it or a rod has no length
  */
 function joined({ joints }: Scene, releases: Release[]): Machine["joints"] {
   return joints.map((joint) => {
@@ -210,9 +213,13 @@ function joined({ joints }: Scene, releases: Release[]): Machine["joints"] {
     const distance = away(own.x - (from ? from[0] : far.x), own.y - (from ? from[1] : far.y))
       + (over ? away(far.x - over[0], far.y - over[1]) : 0);
     const long = length ?? distance;
+    const n = joints.filter((one) => one.kind === kind).findIndex((one) => one.given === given);
     if (kind === "string" && distance > (1 + TAUT) * long) {
-      const n = joints.filter((one) => one.kind === kind).findIndex((one) => one.given === given);
       throw new Fault(`string[${n}].length`, length, "too-short", { least: distance });
+    }
+    if (long < NEAR && (kind === "string" || kind === "rod")) {
+      const [key, place] = joint.from ? ["from", joint.from] : ["other", other];
+      throw new Fault(`${kind}[${n}].${key}`, place, "one-place");
     }
     const { stiffness = 0, damper = 0 } = spring;
     return { kind, particle, from, other, length: long, stiffness, damper };

@@ -15,15 +15,15 @@
 import { judge } from "./breaches.ts";
 import { startCore, type Core, type Event, type Layout } from "./core.ts";
 
-/** ms between two looks at the messages. */
-const TURN = 10;
+/** ms between two looks at the messages, and up to the first of a run. */
+const TURN = 10, FIRST = 2;
 
 /** Most steps of the core between two looks at the clock. */
 const MOST_STEPS = 256;
 
 let core: Core;
 
-let job: { id: number, until: number, steps: number } | null = null;
+let job: { id: number, until: number, steps: number, turn: number } | null = null;
 
 /** A force on a particle, N, or a torque on what hangs on a hinge, N m. */
 export type Given = { disk: number, force: [number, number] } | { surface: number, torque: number };
@@ -63,7 +63,7 @@ function work() {
       const now = performance.now();
       const quick = now - before < 1;
       job.steps = quick ? Math.min(2 * job.steps, MOST_STEPS) : Math.max(1, job.steps >> 1);
-      if (now - began > TURN) break;
+      if (now - began > job.turn) break;
     }
   } catch {
     state = "failed";
@@ -115,6 +115,7 @@ function tell(state: State) {
     gained: core.get("gained"), unsolved: core.get("unsolved_most"),
     contacts: core.get("impact_count"), steps: core.get("step_count"), loads: core.takeLoads(over),
   }, { transfer: [knots.buffer, tips.buffer] });
+  job.turn = TURN;
   if (over) job = null;
   else schedule();
 }
@@ -151,7 +152,7 @@ addEventListener("message", async ({ data }) => {
     postMessage({ type: "laws", id: data.id, breaches: judge(core, data.run) });
   } else if (data.type === "run") {
     core.begin(data.machine);
-    job = { id: data.id, until: data.until, steps: 1 };
+    job = { id: data.id, until: data.until, steps: 1, turn: FIRST };
     for (const one of data.pushes as Push[]) {
       if (goTo(one.at) === "running") push(one);
     }

@@ -9,6 +9,8 @@
 /* By how much what a sleeper bears may change: times its weight, and of what it bore when it fell asleep. */
 #define MORE 1.0
 #define BY 0.3
+/* Of that, what it may differ by for good, from what falls asleep on it. */
+#define LASTING 0.2
 /* Of the way between two, by which neither lies on the other: they lean on each other. */
 #define LEANS 0.2
 /* s on Earth; so long what was woken has to be at rest, if it was where it is before. */
@@ -104,13 +106,22 @@ void wake(int i, double t) {
     }
 }
 
-/* Wake what bears otherwise than when it fell asleep, as the step before has shown. */
+/* The sleeper of two that bears otherwise than when it fell asleep, as the latest step has shown; or -1. What is about to
+   sleep on it may not have it bear much more: of what lies deeper only what is awake would ever be told. */
+static int roused_by(const Frozen *f) {
+    int i = sleeper_of(f), awake = i == f->i ? f->j : f->i;
+    if (i < 0) return -1;
+    double x = f->now[0] - f->bore[0], y = f->now[1] - f->bore[1];
+    double most = MORE * W.disks[i].mass * W.g + BY * sqrt(square(f->bore[0]) + square(f->bore[1]));
+    if (W.disks[awake].rest >= CALM_DOWN / W.pace) most *= LASTING;
+    return x * x + y * y > most * most ? i : -1;
+}
+
+/* Wake all of these. */
 void rouse(void) {
     for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
-        int i = sleeper_of(f);
-        double x = f->now[0] - f->bore[0], y = f->now[1] - f->bore[1];
-        double most = i < 0 ? 0 : MORE * W.disks[i].mass * W.g + BY * sqrt(square(f->bore[0]) + square(f->bore[1]));
-        if (i >= 0 && x * x + y * y > most * most) wake(i, W.t);
+        int i = roused_by(f);
+        if (i >= 0) wake(i, W.t);
     }
 }
 
@@ -225,6 +236,10 @@ static void keep_up(int *up) {
     for (int n = 0; n < 2 * W.near_count; n++) {
         const Disk *d = W.disks + W.near[n];
         if (d->mode == FREE && !d->supports && d->rest >= long_enough) up[W.near[n ^ 1]] = 1;
+    }
+    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
+        int i = roused_by(f);
+        if (i >= 0) up[i == f->i ? f->j : f->i] = 1;
     }
     for (int again = 1; again;) {
         again = 0;

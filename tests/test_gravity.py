@@ -9,7 +9,8 @@ import pytest
 import chutelab
 from chutelab.results import Kind
 from chutelab.results.ledger import energy_at
-from chutelab.scene import SceneError
+from chutelab.scene import SceneError, from_dict
+from chutelab.studies.sweep.plan import Block, are_family, swept
 
 G, R = 9.81, 0.02
 
@@ -154,6 +155,22 @@ def test_closed_forms_turn_with_gravity(angle, far):
     np.testing.assert_allclose(speed @ back, its_speed, **close)
     for name in ("kinetic", "friction_loss", "restitution_loss", "belt_work"):
         assert getattr(other.ledger, name) == pytest.approx(getattr(plain.ledger, name), rel=1e-11)
+
+
+def test_variants_of_a_turned_scene_go_at_once_and_have_the_rows_of_the_upright_one():
+    """Times, losses and work do not know which way is down; a turn that varies goes one by one."""
+    keys, values = ("surface[0].restitution", "surface[1].friction"), np.linspace(0.1, 0.8, 12)
+    plain, other = (
+        swept(Block(from_dict(lone(a)), keys, np.stack([values, values[::-1]], axis=1)))
+        for a in (0.0, -137.0)
+    )
+    names = [name for name in plain if name.startswith("ledger.") or name == "track.t.mean"]
+    assert len(names) > 4
+    for name in names:
+        np.testing.assert_allclose(other[name], plain[name], rtol=0.0, atol=1e-12, err_msg=name)
+    assert np.ptp(other["ledger.restitution_loss"]) > 0.01
+    assert are_family(from_dict(lone(-137.0)), keys, None)
+    assert not are_family(from_dict(lone(0.0)), ("gravity_deg",), None)
 
 
 def test_the_exact_engine_bears_and_ends_tracks_where_the_contact_engine_does():

@@ -178,7 +178,7 @@ def are_family(scene: Scene, paths: Sequence[str], engine: str | None) -> bool:
 
     Their particles meet no other, and where they are several all are of one kind.
     """
-    stepped = scene.crowded or scene.clings or scene.air_density > 0.0 or scene.gravity_deg != 0.0
+    stepped = scene.crowded or scene.clings or scene.air_density > 0.0
     stepped |= (engine or scene.run.engine) in ("contact", "pymunk")
     stepped |= bool(scene.joints or scene.movers or scene.triggers or scene.one_sided)
     stepped |= scene.run.loads is not None or any(kind.outline for kind in scene.particles)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chutelab import machine, scene
+from chutelab import core, machine, scene
 from chutelab.engines.simulation import ENGINES, choose, follow, simulate
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.ledger import ledger
@@ -227,3 +227,15 @@ def test_a_run_that_engines_move_to_an_origin_of_its_own_follows_any_other():
     runs = [simulate(scene.from_dict(far)) for _ in range(2)]
     assert same(*runs)
     np.testing.assert_allclose(runs[0].ends()[1]["position"], [[0.0, 1.0 - 0.5 * 9.81]], atol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["exact", "contact"])
+def test_a_scene_that_was_handed_over_and_never_run_leaves_nothing_behind(engine):
+    """As when Ctrl-C comes between: the core takes memory that it has not been in for zeros."""
+    before = simulate("perpendicular", engine=engine)
+    module = core.Module()
+    assert module.begin_with(np.full(1000, np.nan))
+    core.give_back(module)
+    assert same(simulate("perpendicular", engine=engine), before)
+    assert core.borrow() is module
+    core.give_back(module)

@@ -127,6 +127,7 @@ class Module:
         self._begins = {name: self.call(name.lower()) for name in SUBJECTS}
         self._look()
         self._first: int = self.structs["Room"].first
+        self._begun = 0
         self.forget()
 
     def call(self, name: str, *numbers: float) -> Any:
@@ -143,6 +144,8 @@ class Module:
         """Free all arrays and reset all structs."""
         for rows in self._own:
             rows.fill(0)
+        # The core takes what it has not come to for zeros: nothing of a run that never began.
+        self._bytes[self._first : self._first + self._begun] = 0
 
     def work(self, name: str) -> None:
         """Call a function that may take more memory; it makes all views of arrays invalid.
@@ -211,6 +214,7 @@ class Module:
         """Copy numbers to where the first array will lie; return whether there is room for them."""
         rows = self._bytes[self._first : self._first + numbers.nbytes]
         if fits := len(rows) == numbers.nbytes:
+            self._begun = numbers.nbytes
             rows[:] = numbers.view(np.uint8)
         return fits
 

@@ -326,7 +326,7 @@ def _piles():
         slow=CROWD,
         patience=60.0,
     )
-    # Pymunk has no sleep that this asks for: of 2,000 for a minute it would take an hour.
+    # Pymunk steps what lies still, too: a minute of 2,000 takes it an hour.
     middle = small.but(
         name="pile-400",
         tables=_pile(400, 0.6, 0.01, 10.0),

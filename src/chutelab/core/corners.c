@@ -44,7 +44,7 @@
 typedef struct {
     double p[MOST_CORNERS][2];
     double n[MOST_CORNERS][2]; /* of a polygon, unit vectors out of its edges */
-    double x, y, radius;
+    double x, y, radius;    /* x, y: of a particle's centre */
     const double *edges;    /* of a polygon, see `World.edges` */
     const Surface *s;
     int count, round;       /* points, of which one may have a radius, or -1 */
@@ -169,6 +169,8 @@ static int edge_under(const Shape *a, const Shape *b, const double *q, double ne
 static int are_apart_along(Shape *a, const Shape *b, double by) {
     double best = -INFINITY;
     for (int e = 0; e < a->count; e++) {
+        /* All of a particle is out by less than its centre is. */
+        if (!b->s && off_edge(a, e, &b->x) < best) continue;
         double clear = clear_of(a, e, b);
         if (clear > by) return 1;
         if (clear <= best) continue;
@@ -451,7 +453,7 @@ static double closes_at(int i, int j, const Shape *a, const Shape *b, double t, 
 double whirl_of(const Disk *d) { return d->corners ? d->spin * d->spin * d->radius : 0; }
 
 /* Bound on the speed with which places of two come nearer within a span, m/s; INFINITY if they cannot meet in it. */
-static double fastest_of(int i, int j, double t, double span) {
+RARELY double fastest_of(int i, int j, double t, double span) {
     const Disk *d = W.disks + i, *o = W.disks + MAX(j, 0);
     double h = t - d->t, x = d->x + (d->vx + 0.5 * W.gx * h) * h, y = d->y + (d->vy + 0.5 * W.gy * h) * h, nx, ny;
     double u = d->vx + W.gx * h, v = d->vy + W.gy * h, turns = fabs(d->spin) * d->radius;
@@ -537,12 +539,13 @@ static double rolls_at(int i, int j, double low, double high, double soft) {
     return high;
 }
 
-/* When particle i, which has corners, meets j between two times faster than `soft`: the instant, or INFINITY. */
-double meet_corners(int i, int j, double from, double until, double soft) {
-    double span = until - from, most = fastest_of(i, j, from, span), small = inner_of(i, j), near = TOUCH * small;
+/* When particle i, which has corners, meets j between two times faster than `soft`, `most` being what `fastest_of` says:
+   the instant, or INFINITY. */
+double meet_corners(int i, int j, double from, double until, double most, double soft) {
+    double span = until - from, small = inner_of(i, j), near = TOUCH * small;
     double h = 0, first = INFINITY, gap[CANDIDATES];
     int sides[MOST_CORNERS], in_reach[CANDIDATES], many = 0, closed = 0;
-    if (!(span > 0) || most == INFINITY || most <= soft) return INFINITY;
+    if (!(span > 0) || most <= soft) return INFINITY;
     Shape a = shape_of(i, from), b = shape_of(j, from);
     int count = a.count + b.count, on_segment = b.s && b.s->shape == SEGMENT, both = !b.s && b.round < 0;
     double turn = both ? fabs(W.disks[i].spin) + fabs(W.disks[j].spin) : 0;

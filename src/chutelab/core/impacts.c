@@ -118,8 +118,11 @@ static RARELY double meet_cornered(int i, int j, double from) {
     int first = has_corners(W.disks + i) ? i : j, other = first == i ? j : i;
     const Disk *d = W.disks + first, *o = W.disks + MAX(other, 0);
     int impacts = MAX(d->impacts, other >= 0 ? o->impacts : 0);
+    double most = fastest_of(first, other, from, W.step_end - from);
+    /* So much is left over of any corner. */
+    if (most == INFINITY || most <= W.g * W.step) return INFINITY;
     double soft = other < 0 ? left_over(d, impacts, -1 - other, d->inner, 0) : left_by_corners(d, o, impacts, from);
-    return meet_corners(first, other, from, W.step_end, soft);
+    return meet_corners(first, other, from, W.step_end, most, soft);
 }
 
 static void foresee_pair(int i, int j, double *due, int *partner) {

@@ -194,19 +194,22 @@ static void sort_by_islands(void) {
         if (hung >= 0) parent[island_of(W.contacts[n].i)] = island_of(hung);
         hung = W.contacts[n].i;
     }
+    int one = 1, root = W.contact_count ? island_of(W.contacts[0].i) : -1;
+    for (int n = 0; n < W.contact_count; n++) {
+        W.contacts[n].island = island_of(W.contacts[n].i);
+        one &= W.contacts[n].island == root;
+    }
+    if (one) return;
     /* Of each island a list of its contacts, which begins with its last. */
     for (int n = W.contact_count - 1; n >= 0; n--) {
-        int k = island_of(W.contacts[n].i);
+        int k = W.contacts[n].island;
         next[n] = first[k];
         first[k] = n;
     }
     int count = 0;
     for (int n = 0; n < W.contact_count; n++) {
-        int k = island_of(W.contacts[n].i);
-        for (int m = first[k]; m >= 0; m = next[m]) {
-            W.earlier[count] = W.contacts[m];
-            W.earlier[count++].island = k;
-        }
+        int k = W.contacts[n].island;
+        for (int m = first[k]; m >= 0; m = next[m]) W.earlier[count++] = W.contacts[m];
         first[k] = -1;
     }
     Contact *c = W.contacts;

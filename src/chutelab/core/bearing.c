@@ -20,14 +20,11 @@ static void impulse_of(const Contact *c, double share, double *J) {
     J[1] = share * (pressed(c) * c->ny - c->impulse[1] * c->nx);
 }
 
-/* What a sleeper gets is told of by `tell_frozen`. */
-static int is_on_sleeper(const Contact *c) { return c->j >= 0 && W.disks[c->j].mode == ASLEEP; }
-
 /* Tell of the impulse on disk i of a contact with a surface, or with a rider, whose belt bears it. */
 void bear_contact(const Contact *c, double share, double from, double to) {
     const Disk *a = W.disks + c->i;
     double J[2];
-    if (B.every == 0 || c->two || is_on_sleeper(c)) return;
+    if (B.every == 0 || c->two) return;
     Push p = c->j < 0 ? at_foot(a, c->owner, c->cornered ? c->own[1] : a->radius, c->nx, c->ny, from, to)
                       : on_belt(W.disks + c->j, from, to);
     if (c->cornered && c->j < 0) {
@@ -48,7 +45,7 @@ static void keep_push(const Disk *d, const Push *p, double depth) {
 }
 
 /* What disk i of a contact is off the other, or off its foot on a surface, m. */
-void branch_of(const Contact *c, double *b) {
+static void branch_of(const Contact *c, double *b) {
     const Disk *a = W.disks + c->i, *other = W.disks + MAX(c->j, 0);
     b[0] = c->j < 0 ? a->radius * c->nx : a->x - other->x;
     b[1] = c->j < 0 ? a->radius * c->ny : a->y - other->y;
@@ -72,7 +69,7 @@ void keep_impulse(const Contact *c, double share, double from, double to) {
 /* What a contact takes from a rider its belt gives it, of a blow too: the rider's way stays as it is. */
 void keep_carried(const Contact *c, double share, double from, double to) {
     double J[2];
-    if (B.each == 0 || c->j < 0 || c->two || is_on_sleeper(c)) return;
+    if (B.each == 0 || c->j < 0 || c->two) return;
     impulse_of(c, share, J);
     Push p = on_belt(W.disks + c->j, from, to);
     p.jx = J[0];
@@ -118,138 +115,98 @@ void bear_ride(int i) {
     if (B.each > 0) keep_push(d, &p, d->radius);
 }
 
-/* Tell that what was frozen holds both no more from t on. */
-void melt(Frozen *f, double t) {
-    double time = t - f->from, J[2] = {time * (f->force[0] + f->more[0]), time * (f->force[1] + f->more[1])};
-    const Disk *d = W.disks + f->i, *first = W.disks + f->first;
-    if (f->from == INFINITY) return;
-    f->from = INFINITY;
-    if (B.each > 0) keep_contact(f->i, f->j < 0 ? -1 - W.surfaces[-1 - f->j].owner : f->j, t - time, t, J, f->branch);
-    if (B.every > 0 && f->j < 0) {
-        const Surface *s = W.surfaces + (-1 - f->j);
-        double nx, ny, way = d->t - (t - time);
-        gap_to(s, d->x, d->y, d->radius, &nx, &ny);
-        Push p = at_foot(d, s->owner, 0, nx, ny, t - time, t);
-        p.vx = d->ux;
-        p.vy = d->uy;
-        p.x -= f->branch[0] + d->ux * way;
-        p.y -= f->branch[1] + d->uy * way;
-        p.jx = J[0];
-        p.jy = J[1];
-        bear(&p);
-    }
-    time = f->first == f->i ? -time : time;
-    if (f->j >= 0) bear_disk(first, first->bearer, time * f->more[0], time * f->more[1], t - fabs(time), t);
+/* Note the force by which a surface that is pressed bore a disk in a step; it is the last of `held`. */
+void note_force(Disk *d, const Contact *c, double span) {
+    double *force = d->bears + 2 * (d->held_count - 1);
+    force[0] = (pressed(c) * c->nx + c->impulse[1] * c->ny) / span;
+    force[1] = (pressed(c) * c->ny - c->impulse[1] * c->nx) / span;
 }
 
-/* Tell up to when a sleeper has got the impulse J from what is awake, J on i of the two: what it did not count on, what
-   bears it takes. */
-void tell_frozen(Frozen *f, int sleeper, const double *J, double to) {
-    const Disk *d = W.disks + sleeper;
-    double time = to - f->told, sign = sleeper == f->j ? 1 : -1;
-    bear_disk(d, d->bearer, sign * (J[0] - f->force[0] * time), sign * (J[1] - f->force[1] * time), MIN(f->told, to), MAX(f->told, to));
-    f->told = to;
+/* Tell of what surfaces gave a sleeper since it fell asleep, and for some time more at the end. */
+void bear_asleep(const Disk *d, double until, double more) {
+    if (B.each > 0) keep_awake((int)(d - W.disks), until, until - d->slept + more);
+    for (int n = 0; n < d->held_count && B.every > 0; n++) {
+        double nx, ny, time = until - d->slept + more;
+        const Surface *s = W.surfaces + d->held[n];
+        double depth = depth_of(d, s, &nx, &ny);
+        Push p = at_foot(d, s->owner, depth, nx, ny, d->slept, until);
+        p.vx = d->ux;
+        p.vy = d->uy;
+        p.x -= d->ux * (d->t - d->slept);
+        p.y -= d->uy * (d->t - d->slept);
+        p.jx = d->bears[2 * n] * time;
+        p.jy = d->bears[2 * n + 1] * time;
+        bear(&p);
+    }
+}
+
+/* Islands that have just fallen asleep are borne by their weight: what the forces of the latest step are off
+   it, a solve's rest, goes to all of them in proportion. `W.queue` leads to islands. */
+void balance_sleepers(void) {
+    for (int i = W.low; i < W.high && B.every > 0; i++) {
+        if (W.disks[i].mode != ASLEEP || W.disks[i].slept != W.t || island_of(i) != i) continue;
+        double x = 0, y = 0, size = 0;
+        for (int pass = 0; pass < 2; pass++)
+            for (int n = W.low; n < W.high; n++) {
+                Disk *d = W.disks + n;
+                if (d->mode != ASLEEP || d->slept != W.t || d->island != i) continue;
+                if (pass == 0) x -= d->mass * W.gx, y -= d->mass * W.gy;
+                for (double *f = d->bears; f < d->bears + 2 * d->held_count; f += 2) {
+                    double strong = sqrt(square(f[0]) + square(f[1]));
+                    if (pass == 0) x -= f[0], y -= f[1], size += strong;
+                    else f[0] += x * strong / size, f[1] += y * strong / size;
+                }
+            }
+    }
 }
 
 /* Rounds of conjugate gradients, and the share of weight that they may leave. */
-#define ROUNDS 1000
+#define ROUNDS 200
 #define BALANCED 1e-12
-/* Of what a smooth surface gives along its normal, what it may give across. */
-#define SMOOTH 1e-4
 
 enum { LEFT, AHEAD, CHANGE, RAISED };
 
 /* One of the four vectors of a disk. */
-static double *of(int disk, int which) { return W.balance + 8 * disk + 2 * which; }
+static double *of(int disk, int which) { return B.balance + 8 * disk + 2 * which; }
 
-/* Whether a disk is balanced now: it has just fallen asleep, or all that it hangs together with sleeps. */
-static int is_new(int i) { return i >= 0 && W.disks[i].mode == ASLEEP && W.disks[i].slept == W.t; }
-
-/* What a frozen contact gives more if its disks differ by so much: in proportion to its strength, and on a smooth surface
-   hardly but along its normal. */
-static void give_more(const Frozen *f, int which, double *given) {
-    double force[2], more[2], strong = 0, along = 0;
-    double across = f->j < 0 && surface_pair(W.disks + f->i, -1 - f->j)->friction == 0 ? SMOOTH : 1;
-    for (int n = 0; n < 2; n++) {
-        force[n] = f->force[n] + f->more[n];
-        more[n] = of(f->i, which)[n] - (f->j < 0 ? 0 : of(f->j, which)[n]);
-        strong += square(force[n]);
-        along += force[n] * more[n];
-    }
-    for (int n = 0; n < 2; n++) given[n] = across * strong * more[n] + (1 - across) * along * force[n];
-}
-
-/* Add up at disks what contacts give more of `which` into `to`. */
-static void add_raised(int which, int to) {
-    double given[2];
-    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
-        if (f->from != W.t) continue;
-        give_more(f, which, given);
+/* Raise each contact's force on its disk by how much more of `which` the disk has than the other, and add up at
+   disks what that gives into `to`. */
+static void add_raised(const Lasting *rows, int count, int which, int to) {
+    for (const Lasting *c = rows; c < rows + count; c++)
         for (int n = 0; n < 2; n++) {
-            of(f->i, to)[n] += given[n];
-            if (f->j >= 0) of(f->j, to)[n] -= given[n];
+            double more = of(c->disk, which)[n] - (c->other < 0 ? 0 : of(c->other, which)[n]);
+            of(c->disk, to)[n] += more;
+            if (c->other >= 0) of(c->other, to)[n] -= more;
         }
-    }
 }
 
-/* Set a vector to 0 where nothing is balanced; return the sum of the squares of the rest. */
-static double square_of(int which) {
-    double sum = 0;
-    for (int i = W.low; i < W.high; i++)
-        for (int n = 0; n < 2; n++) sum += square(of(i, which)[n] *= is_new(i));
-    return sum;
-}
-
-/* Begin anew with what hangs together and sleeps now as a whole, after a part of it did: all that it is held by is
-   balanced once more. */
-static void begin_whole(void) {
-    int *parent = W.queue, *open = W.found;
-    for (EACH_LIVE(i)) {
-        parent[i] = i;
-        open[i] = 0;
-    }
-    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++)
-        if (f->j >= 0 && f->from < INFINITY) parent[island_of(f->i)] = island_of(f->j);
-    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++)
-        if (f->from == INFINITY) open[island_of(W.disks[f->i].mode == ASLEEP ? f->i : f->j)] = 1;
-    for (EACH_LIVE(i))
-        if (is_new(i)) open[island_of(i)] |= 2;
-    for (Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
-        if (f->from == INFINITY || open[island_of(f->i)] != 2) continue;
-        melt(f, W.t);
-        f->from = W.t;
-        for (int n = 0; n < 2; n++) f->force[n] += f->more[n], f->more[n] = 0;
-    }
-    for (EACH_LIVE(i))
-        if (W.disks[i].mode == ASLEEP && open[island_of(i)] == 2) W.disks[i].slept = W.t;
-}
-
-/* Change the forces of what has just been frozen by the least that has them bear the weight of those that fell asleep:
-   what the forces of the latest step are off it is a solve's rest. The change is a difference of what disks have, a
-   potential, whose Laplacian on the net of contacts is what weight lacks. */
-void balance_sleepers(void) {
-    begin_whole();
+/* Change the forces of contacts by the least that has them bear the weight of all sleepers: what the forces of the
+   latest step are off it is a solve's rest. The change is a difference of what disks have, a potential, whose
+   Laplacian on the net of contacts is what weight lacks. */
+static void balance_contacts(Lasting *rows, int count) {
+    double size = 0, weight = 0;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
+        int sleeps = d->mode == ASLEEP && d->slept == W.t;
         for (int n = 0; n < 8; n++) of(i, 0)[n] = 0;
-        of(i, LEFT)[0] = -d->mass * W.gx;
-        of(i, LEFT)[1] = -d->mass * W.gy;
+        of(i, LEFT)[0] = sleeps ? -d->mass * W.gx : 0;
+        of(i, LEFT)[1] = sleeps ? -d->mass * W.gy : 0;
+        for (int n = 0; n < 2; n++) weight += square(of(i, LEFT)[n]);
     }
-    double weight = square_of(LEFT);
-    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++)
-        for (int n = 0; n < 2 && (f->from == W.t || f->from == INFINITY); n++) {
-            double force = f->force[n] + (f->from == W.t ? f->more[n] : 0);
-            of(f->i, LEFT)[n] -= force;
-            if (f->j >= 0) of(f->j, LEFT)[n] += force;
+    for (const Lasting *c = rows; c < rows + count; c++)
+        for (int n = 0; n < 2; n++) {
+            of(c->disk, LEFT)[n] -= (&c->x)[n];
+            if (c->other >= 0) of(c->other, LEFT)[n] += (&c->x)[n];
         }
-    double size = square_of(LEFT);
     for (int i = W.low; i < W.high; i++)
-        for (int n = 0; n < 2; n++) of(i, AHEAD)[n] = of(i, LEFT)[n];
+        for (int n = 0; n < 2; n++) {
+            of(i, AHEAD)[n] = of(i, LEFT)[n];
+            size += square(of(i, LEFT)[n]);
+        }
     for (int round = 0; round < ROUNDS && size > square(BALANCED) * weight; round++) {
-        double along = 0, now;
+        double along = 0, now = 0;
         for (int i = W.low; i < W.high; i++) of(i, RAISED)[0] = of(i, RAISED)[1] = 0;
-        add_raised(AHEAD, RAISED);
-        square_of(RAISED);
+        add_raised(rows, count, AHEAD, RAISED);
         for (int i = W.low; i < W.high; i++)
             for (int n = 0; n < 2; n++) along += of(i, AHEAD)[n] * of(i, RAISED)[n];
         if (!(along > 0)) break;
@@ -257,21 +214,33 @@ void balance_sleepers(void) {
             for (int n = 0; n < 2; n++) {
                 of(i, CHANGE)[n] += size / along * of(i, AHEAD)[n];
                 of(i, LEFT)[n] -= size / along * of(i, RAISED)[n];
+                now += square(of(i, LEFT)[n]);
             }
-        now = square_of(LEFT);
         for (int i = W.low; i < W.high; i++)
             for (int n = 0; n < 2; n++) of(i, AHEAD)[n] = of(i, LEFT)[n] + now / size * of(i, AHEAD)[n];
         size = now;
     }
-    for (Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
-        double given[2];
-        if (f->from != W.t) continue;
-        give_more(f, CHANGE, given);
+    for (Lasting *c = rows; c < rows + count; c++) {
+        double *force = &c->x, strong = square(force[0]) + square(force[1]), b[2];
+        for (int n = 0; n < 2; n++) b[n] = (force[0] * c->stress[n] + force[1] * c->stress[2 + n]) / strong;
         for (int n = 0; n < 2; n++) {
-            f->more[n] += given[n];
-            if (f->j >= 0 && !(is_new(f->i) && is_new(f->j))) continue;
-            f->force[n] += f->more[n];
-            f->more[n] = 0;
+            force[n] += of(c->disk, CHANGE)[n] - (c->other < 0 ? 0 : of(c->other, CHANGE)[n]);
+            for (int k = 0; k < 2; k++) c->stress[2 * n + k] = force[n] * b[k];
         }
     }
+}
+
+/* Keep the forces that hold what has just fallen asleep: those of its latest step, balanced. */
+void keep_sleepers(void) {
+    int first = B.asleep_count;
+    for (int n = 0; n < W.contact_count && B.each > 0; n++) {
+        const Contact *c = W.contacts + n;
+        const Disk *d = W.disks + c->i;
+        double force[2], b[2];
+        if (d->mode != ASLEEP || d->slept != W.t || (c->impulse[0] == 0 && c->clings == 0)) continue;
+        impulse_of(c, 2 / (W.length_before + W.length), force);
+        branch_of(c, b);
+        keep_asleep(c->i, other_of(c), d->slept, force, b);
+    }
+    if (B.asleep_count > first) balance_contacts(B.asleep + first, B.asleep_count - first);
 }

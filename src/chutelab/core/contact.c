@@ -72,9 +72,8 @@ void describe(Contact *c, int i, int j) {
         c->gap = d - r - rb;
         pair = pair_of(a->kind, b->kind);
         c->two = b->mode == FREE;
-        const double *v = b->mode == ASLEEP ? &b->ux : &b->vx;
-        c->other[0] = v[0] * c->nx + v[1] * c->ny;
-        c->other[1] = v[0] * c->ny - v[1] * c->nx;
+        c->other[0] = b->vx * c->nx + b->vy * c->ny;
+        c->other[1] = b->vx * c->ny - b->vy * c->nx;
         c->other[2] = 0;
         if (c->two) {
             mass += b->inv_mass;
@@ -89,7 +88,7 @@ void describe(Contact *c, int i, int j) {
     c->rest = pair->restitution, c->falls = pair->falls;
     c->share = 1;
     c->clings = 0;
-    c->pull = j < 0 || W.disks[j].mode == ASLEEP ? W.gx * c->ny - W.gy * c->nx - escapes[0] : 0;
+    c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx - escapes[0] : 0;
     c->gives = c->turns = 0;
     c->most = INFINITY;
     c->parts = 0;
@@ -136,11 +135,6 @@ void push(const Contact *c, const double *J) {
         b->spin += ((c->cornered ? c->others[0] * J[0] + c->others[1] * J[1] : b->radius * J[1]) - J[2]) * b->inv_inertia;
     }
     if (c->hung) push_hinge(c, J);
-}
-
-/* The owner of what carries a rider or sleeper that gives its work to a contact. */
-int giver_of(const Contact *c) {
-    return W.disks[c->j].mode == ASLEEP ? W.disks[c->j].bearer : W.ride_owner;
 }
 
 /* Ledger entries of a contact's impulses, which changed its relative velocities from u to v: an

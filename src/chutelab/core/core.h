@@ -20,9 +20,6 @@ extern World W;
 /* What was too small, so that `run` makes more room. */
 enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS, FULL_SWINGS };
 
-/* Where a run is: what it does next. */
-enum Phase { PART, STEP, WITHIN };
-
 /* Contacts are looked for where a gap is below this share of the radius: what lasts stays a
    thousandth of it apart at most, and nothing crosses the rest within a step unseen. */
 #define TOUCH 5e-3
@@ -334,7 +331,6 @@ void knot_after(int i);
 void knot_before(int i, double t, double vx, double vy, double spin);
 void flush_track(int i);
 void track_lasting(int i);
-void last_on(int i);
 void track_flying(int i);
 void knot_held(int i);
 void finish(int i, int reason);
@@ -353,19 +349,18 @@ void begin_in_air(int i, double middle);
 void bear_contact(const Contact *c, double share, double from, double to);
 void bear_disk(const Disk *d, int owner, double jx, double jy, double from, double to);
 void bear_ride(int i);
+void note_force(Disk *d, const Contact *c, double span);
+void bear_asleep(const Disk *d, double until, double more);
 void balance_sleepers(void);
 void keep_impulse(const Contact *c, double share, double from, double to);
 void keep_carried(const Contact *c, double share, double from, double to);
-void melt(Frozen *f, double t);
-void tell_frozen(Frozen *f, int sleeper, const double *J, double to);
-void branch_of(const Contact *c, double *b);
+void keep_sleepers(void);
 
 /* contact.c */
 void describe(Contact *c, int i, int j);
 void relative(const Contact *c, int earlier, double *out);
 void push(const Contact *c, const double *impulse);
 int island_of(int i);
-int giver_of(const Contact *c);
 void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given);
 void pool(Contact *list, int count, int later);
@@ -417,17 +412,12 @@ void solve_contacts(int again);
 /* closing.c */
 void give_in(const Contact *list, int count);
 void close_step(double h);
-void unload(int i, const int *up);
 void take_back(int i);
 void end_in_contact(int i, int reason);
 
 /* sleep.c */
 void wake(int i, double t);
 void fall_asleep(void);
-int find_frozen(int i, int j);
-void note_frozen(void);
-void untell_frozen(const Contact *c, double share);
-void rouse(void);
 
 /* prepare.c */
 int stretch_swings(void);

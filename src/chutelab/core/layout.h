@@ -96,12 +96,11 @@ typedef struct {
     int before;                 /* first of those of the step before, or -1 */
     int queued, moved, jam;     /* marks of the shock, and of the latest jam */
     int jam_next;               /* the next disk in that jam, or -1 */
-    int bearer;                 /* of a sleeper: owner of a surface that bears it */
-    int frozen;                 /* first of its ends of `World.frozen`, or -1 */
-    int rouses;                 /* the next that wakes with it, or -1 */
+    int island;
     int nearby_count;           /* surfaces whose boxes meet its zone; MAX_NEARBY + 1: too many */
     int held_count;
-    int held[MAX_HELD];         /* surfaces it lies on */
+    int held[MAX_HELD];         /* surfaces it lies on ... */
+    double bears[8];            /* N; ... and with which forces they bore it in the latest step, x and y of each */
     int ride_met;               /* surface where a ride ends, or -1 */
     int on;                     /* surface it lasts on by itself, or -1 */
     int slips;                  /* whether it slips there */
@@ -287,7 +286,6 @@ typedef struct {
     int owner;              /* of the ledger entries */
     int island;             /* a disk by which it is known */
     int next;               /* of the contacts of disk i in the step before */
-    int frozen;             /* number of the frozen contact that it was, or that a sleeper counts on, from 1 on, or 0 */
     int leaves;             /* it parts in this step */
     int hung;               /* number of the hinge that feels the impulse from 1 on, or 0 */
     int cornered;           /* i has corners, and perhaps j */
@@ -296,17 +294,6 @@ typedef struct {
     double looked[7];       /* m, rad; as the place was looked up: the gap, and x, y and `turned` of i and of j */
     int places, pad;        /* at which the two touched then */
 } Contact;
-
-/* A contact of a sleeper, of which the other may be awake. Forces are on i, N. */
-typedef struct {
-    double impulse[3];      /* N s; as of `Contact`, when the later one fell asleep */
-    double bore[2], now[2]; /* when the first one fell asleep, and in the latest step */
-    double force[2], more[2]; /* what is told of it: what the first one counts on, and what the other has besides */
-    double branch[2];       /* m; of i off the other, or off its foot */
-    double from, told;      /* s; since when both sleep, or INFINITY; else, up to when the sleeper is told of */
-    double rise;            /* how far i is above j, of the way between them; 0 if they lean on each other */
-    int i, j, first, pad;   /* j as of `Contact`; which of them has slept for longer */
-} Frozen;
 
 /* What the impulses of a solve change of a disk, and what one of 1 N s does to it. The first of all is of
    what does not give way. */
@@ -405,9 +392,6 @@ typedef struct {
     SolverFour *fours;   /* (four_room) the same in single precision */
     LeverFour *lever_fours; /* (four_room) ... and their levers */
     LightBody *light_bodies; /* (disks + 1 + movers) */
-    Frozen *frozen;      /* (2 contacts) of sleepers */
-    int *frozen_links;   /* (4 contacts) the next end of one, 2 n and 2 n + 1 of frozen n, of the same disk, or -1 */
-    double *balance;     /* (disks, 4, 2) room for conjugate gradients */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */
     int *near_links;     /* (2 near) the next place in `near` of the same disk, or -1 */
@@ -459,8 +443,6 @@ typedef struct {
     double accurate;     /* m/s; changes at which sweeps end */
     /* [out] */
     int knot_count, event_count, total_count, contact_count, near_count, earlier_count, swing_count;
-    int frozen_count;
-    int roused;          /* what is frozen is to be looked through: some have been woken */
     int later_count;     /* pairs in `near` beyond `near_count`, of what may meet since its path changed within the step; -1:
                             there is no room for them */
     int woken;           /* whether the latest blow has woken any */
@@ -744,9 +726,11 @@ typedef struct {
     int overflow;           /* [out] there were to be more of them than MOST_BINS, or than memory has room for */
     double each;            /* [in] s; how long a bin of lasting contacts is; 0: they are not kept */
     Lasting *lasting;       /* [out] bin by bin */
+    Lasting *asleep;        /* what holds sleepers, each second; in no order */
     int *seats;             /* rows of this bin by their pairs, + 1 */
+    double *balance;        /* (disks, 4, 2) room for conjugate gradients */
     int lasting_count;      /* [out] */
-    int lasting_room, seat_count, first, pad;
+    int lasting_room, asleep_count, asleep_room, seat_count, first;
     double bin;             /* which one `first` begins */
 } Loads;
 

@@ -17,11 +17,17 @@ typedef struct {
 extern Loads B;
 
 /* Set the first bins apart; 0 if there is no memory. */
-int lay_out_bins(int owners);
+int lay_out_bins(int owners, int disks);
 
 void bear(const Push *p);
 
 /* Keep what a lasting contact gave a disk between two times: the impulse J, and b, see `Lasting`. */
 void keep_contact(int disk, int other, double from, double to, const double *J, const double *b);
+
+/* Keep what holds a sleeper from then on, each second, until it wakes. */
+void keep_asleep(int disk, int other, double from, const double *force, const double *b);
+
+/* A disk woke: what held it, did so for some time. */
+void keep_awake(int disk, double to, double time);
 
 #endif

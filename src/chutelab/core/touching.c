@@ -1,7 +1,6 @@
 /* What touches at the beginning of a step, and what each contact needs: the change of normal velocity
    that keeps its gap closed at the step's end. */
 
-#include <string.h>
 #include "core.h"
 
 /* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step, of an overlap
@@ -146,8 +145,6 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     }
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     for (int n = 0; n < 3 && last; n++) c->impulse[n] = W.again * last->impulse[n];
-    c->frozen = place ? 0 : find_frozen(i, j);
-    if (c->frozen && !last) memcpy(c->impulse, W.frozen[c->frozen - 1].impulse, 2 * sizeof(double));
     int was_pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
        above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
@@ -275,7 +272,7 @@ int find_contacts(double h, int *woke) {
         if (cornered) bound = MAX(bound, left_over(b, impacts, -1, least, 0));
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
             bound = MAX(bound, cornered ? (W.earlier_count > FEW_CONTACTS ? LATEST : 1) * W.soft : MAX(W.soft, W.skip * least));
-        if (cornered && (a->mode == ASLEEP || b->mode == ASLEEP)) {
+        if (a->mode == ASLEEP || b->mode == ASLEEP) {
             wake(a->mode == ASLEEP ? i : j, W.t);
             *woke = 1;
         }

@@ -220,7 +220,7 @@ class Core extends Memory {
     });
     this.work("prepare");
     this.set("every", machine.loads, "Loads");
-    if (machine.loads) this.work("lay_out_bins", machine.surfaces.length);
+    if (machine.loads) this.work("lay_out_bins", machine.surfaces.length, 0);
   }
 
   pair(

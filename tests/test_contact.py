@@ -308,6 +308,25 @@ def test_stream_presses_nobody_and_loses_no_joule():
     assert {REASONS[k] for k in recording.ended} == {"settled"}
 
 
+def test_of_what_is_poured_one_overlap_in_a_hundred_is_deeper_than_half_a_percent():
+    """Of the radius; the deepest is no more than three times that: pairs and walls."""
+    drawn = {
+        "particle": {"radius": 0.004, "mass": 0.0021},
+        "surface": [
+            {"name": "box", "points": [[-0.15, 3.0], [-0.15, 0.0], [0.15, 0.0], [0.15, 3.0]],
+             "restitution": 0.5, "friction": 0.3},
+        ],
+        "stream": {"count": 300, "rate": 1000.0, "at": [-0.1, 1.0], "velocity": [2.0, 0.0],
+                   "bed_height": 0.1, "interact": True},
+        "run": {"until": 1.0},
+    }  # fmt: skip
+    machine = build(scene.from_dict(drawn))
+    recording, times = run(machine), np.arange(0.0, 1.0, 5e-3)
+    for depth in (overlaps(recording, times), inside_surfaces(recording, machine, times)):
+        assert depth.percentile_99 <= 0.005, depth
+        assert 0.0 < depth.worst <= 0.015, depth
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("width", np.linspace(0.15, 0.3, 20).round(4))
 def test_boxes_are_asleep_within_four_seconds(width):

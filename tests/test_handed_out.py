@@ -23,7 +23,8 @@ from chutelab.classroom.lessons.sheets import printed
 from chutelab.classroom.lessons.steps import quantities_in
 from chutelab.classroom.lessons.texts import without_tex
 from chutelab.engines.simulation import judged
-from chutelab.pictures.animation import lay_out, palette
+from chutelab.pictures.animation import lay_out
+from chutelab.pictures.animation.files import palette
 from chutelab.pictures.animation.moments import asked, film, slowness, span
 from chutelab.pictures.plots import style
 from chutelab.results.quantities import measure

@@ -8,7 +8,7 @@
 /* Overlap, in radii, up to which an approach that is slow enough to be a lasting contact's may lead by the end of the
    step: what is supported is left to the next step at so much, since a blow on a pile has no end of blows. Of corners it
    is more, up to LATEST: a blow of boxes is passed on four times as often. */
-#define LATE 2e-3
+#define LATE 1e-3
 #define LATE_CORNERS 2e-3
 
 /* ------------------------------------------------------------------ the next event of each disk */

@@ -1,14 +1,15 @@
-/* Sweeps over the rows of a crowd four at a time, in single precision: what ends them are changes of 1e-5 of the
-   velocities. Rows of one colour share no disk, so four of them are one to the processor. What they find is taken
-   up in double precision; see rows.c for what a row is given. */
+/* Gauss-Seidel sweeps over the rows of a crowd, four rows at a time, in single precision. That is enough, as they end
+   when velocities change by 1e-5 of their size. Rows of one colour share no disk, so one vector instruction can solve
+   four of them. rows.c takes the impulses over in double precision, and explains what a row does. */
 
 #include "core.h"
 
-/* Of rows that share a disk each has its own: up to so many, a disk among equal ones has six; the rest are one by one. */
+/* Number of colours. Rows that share a disk have different ones; a disk among equal ones touches six. Rows beyond the last
+   colour are solved one by one. */
 #define COLOURS 24
-/* Of the normal impulse, and of a moment's bound: less is what is left where sums fade away, with ever fewer digits. */
+/* Friction below this share of the normal impulse, and a moment below this share of its bound, is rounding: it becomes 0. */
 #define NOTHING 1e-12
-/* Stands for numbers without a bound: finite, so that it can be multiplied by 0. */
+/* Replaces infinity, which cannot be multiplied by 0. */
 #define ANY 1e30f
 
 static int fours, bodies;
@@ -35,7 +36,7 @@ static float greatest(Four v) {
     return MAX(one, MAX(wasm_f32x4_extract_lane(v, 2), wasm_f32x4_extract_lane(v, 3)));
 }
 
-/* Rows for columns. */
+/* Transpose four vectors of four. */
 static inline void transpose(Four *v) {
     Four a = wasm_i32x4_shuffle(v[0], v[1], 0, 4, 1, 5), b = wasm_i32x4_shuffle(v[2], v[3], 0, 4, 1, 5);
     Four c = wasm_i32x4_shuffle(v[0], v[1], 2, 6, 3, 7), d = wasm_i32x4_shuffle(v[2], v[3], 2, 6, 3, 7);
@@ -45,7 +46,7 @@ static inline void transpose(Four *v) {
     v[3] = wasm_i64x2_shuffle(c, d, 1, 3);
 }
 
-/* x, y and rim of the bodies of four rows. */
+/* Load x, y and rim of the bodies of four rows. */
 static inline void gather(const int *which, Four *v) {
     for (int k = 0; k < 4; k++) v[k] = get(&W.light_bodies[which[k]].x);
     transpose(v);
@@ -56,7 +57,7 @@ static inline void scatter(const int *which, Four *v) {
     for (int k = 0; k < 4; k++) set(&W.light_bodies[which[k]].x, v[k]);
 }
 
-/* As `give`, of four rows; `rolls` and `cornered` are of all of them. */
+/* `give` of rows.c for four rows; `rolls` and `cornered` are true if they are for any row of all. */
 static inline Four give(SolverFour *f, int rolls, int cornered) {
     const LeverFour *l = W.lever_fours + (cornered ? f - W.fours : 0);
     Four a[4], b[4], nx = get(f->nx), ny = get(f->ny), J = get(f->impulse), T = get(f->along), mass = get(f->mass);
@@ -108,12 +109,12 @@ static inline Four give(SolverFour *f, int rolls, int cornered) {
     return change;
 }
 
-/* What four impulses have gone since the last time that they were hastened, times how they were hastened then. */
+/* How far four impulses have come since the last momentum step, times that step. */
 static inline Four went(const float *now, const float *swept, const float *course, const float *light) {
     return by(by(less(get(now), get(swept)), get(course)), get(light));
 }
 
-/* Have four numbers go on so much of where two sweeps and what hastened them have led to. */
+/* One momentum step of four numbers: a share of what two sweeps and the last momentum step changed. */
 static inline void go_on_by(float *now, float *swept, float *course, Four go, int begun) {
     Four more = begun ? by(go, sum(less(get(now), get(swept)), get(course))) : all(0), to = sum(get(now), more);
     set(course, more);
@@ -121,7 +122,7 @@ static inline void go_on_by(float *now, float *swept, float *course, Four go, in
     set(now, to);
 }
 
-/* As `hasten` of rows.c. Velocities are sums of impulses: they go on as these do. */
+/* `hasten` of rows.c. Velocities are linear in the impulses, so the same step is taken for them. */
 static inline int hasten(int age, int rolls) {
     Four along = all(0);
     for (SolverFour *f = W.fours; f < W.fours + fours && age > 1; f++) {
@@ -141,7 +142,7 @@ static inline int hasten(int age, int rolls) {
     return age + 1;
 }
 
-/* As `sweep_rows`. */
+/* `sweep_rows` of rows.c. */
 static inline double sweep(int sweeps, int plain, double accurate, double most, int rolls, int cornered) {
     double worst = 0;
     int age = 0;
@@ -162,7 +163,7 @@ static inline double sweep(int sweeps, int plain, double accurate, double most, 
 
 static inline float bounded(double a) { return (float)MIN(a, ANY); }
 
-/* Sort rows into fours; return whether there is room for them, and whether one rolls. */
+/* Colour the rows and copy them into fours. Return whether there is room for them; set whether any has rolling friction. */
 static int set_fours(int rows, int cornered, int *rolls) {
     int begin[COLOURS + 1] = {0};
     fours = 0;
@@ -236,8 +237,8 @@ static int set_fours(int rows, int cornered, int *rolls) {
     return 1;
 }
 
-/* Sweep over so many rows by fours, as `sweep_rows` does, up to changes of `most`; the rows have what was found, which is
-   for `scale` to take up, unless the sweeps diverge. */
+/* Sweep over the rows by fours, as `sweep_rows` does; changes above `most` mean that the sweeps diverge, INFINITY is
+   returned then. Else the rows have the new impulses; the caller updates the velocities by `scale`. */
 double sweep_fours(int rows, int all_bodies, int cornered, int sweeps, int plain, double accurate, double most) {
     int rolls = 0;
     if (!set_fours(rows, cornered, &rolls)) return INFINITY;

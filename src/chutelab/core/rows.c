@@ -1,31 +1,30 @@
-/* Contacts that are solved together as rows of numbers, and sweeps over them: projected Gauss-Seidel
-   with momentum.
+/* Solver rows, one for each contact of an island, and sweeps over them: projected Gauss-Seidel with momentum.
 
-   A row's matrix (normal, tangent) = ((nx, ny), (ny, -nx)) is its own inverse: it makes normal velocity
-   and slip of a velocity, and a change of velocity of a normal and a tangential impulse. */
+   A row's matrix (normal, tangent) = ((nx, ny), (ny, -nx)) is its own inverse: it turns a velocity into
+   normal velocity and slip, and a normal and a tangential impulse into a vector. */
 
 #include "core.h"
 
-/* Sine of the angle between surfaces that count as one: of less nothing is left by rounding. */
+/* Sine of the angle below which two surfaces count as parallel: rounding leaves no digits of a smaller one. */
 #define PARALLEL 1e-7
-/* Times the first change: sweeps whose changes grow so far never end. */
+/* Sweeps diverge if a change is so many times the first one. */
 #define DIVERGES 1e3
-/* Of momentum. */
+/* Share of a disk's momentum; a smaller normal impulse is rounding. */
 #define NOISE 1e-11
-/* Rows from which on they are swept by fours first. */
+/* Number of rows from which they are swept by fours first. */
 #define LARGE 32
-/* Of an interval, to where it ends in rounding. */
+/* Bisections of an interval until it is as small as rounding. */
 #define HALVINGS 50
-/* m/s; what a contact is free to open with that asks for nothing: finite, so that it can be multiplied by 0. */
+/* m/s; speed at which a contact that asks for nothing is free to open. Finite, since infinity cannot be multiplied by 0. */
 #define ANY 1e100
 
-/* The rows: those between disks, and from `pairs` on those on what does not give way. `clings`: cohesion pulls in one;
-   `cornered`: one has levers, of a particle with corners or a hinge. */
+/* Rows before `pairs` are contacts of two free particles, the others are contacts with something that is fixed or carried.
+   `clings`: a row has cohesion. `cornered`: a row has levers (particles with corners, hinges). */
 static int pairs, rows, bodies, clings, cornered;
-/* Those of contacts; the others are of hinges, whose bodies begin with that. */
+/* Number of rows of contacts; rows of hinges follow. The first body that is a hinge. */
 static int contacts, hinges;
 
-/* A choice between doubles is a jump in what is made of WebAssembly, between vectors it is not. */
+/* Minimum and maximum by vectors: compilers of WebAssembly make a branch of a choice between doubles. */
 static inline double least(double a, double b) {
     return wasm_f64x2_extract_lane(wasm_f64x2_pmin(wasm_f64x2_splat(b), wasm_f64x2_splat(a)), 0);
 }
@@ -34,14 +33,14 @@ static inline double most(double a, double b) {
 }
 static inline double first(Two v) { return wasm_f64x2_extract_lane(v, 0); }
 static inline double second(Two v) { return wasm_f64x2_extract_lane(v, 1); }
-/* Of a velocity normal velocity and slip, of impulses their vector. */
+/* Turn a velocity into normal velocity and slip, or a normal and a tangential impulse into a vector. */
 static inline Two turned(const SolverRow *c, Two v) {
     return plus(times(first(v), two(c->normal)), times(second(v), two(c->tangent)));
 }
 
 static inline RowLever *lever_of(const SolverRow *c) { return W.levers + (c - W.rows); }
 
-/* Normal velocity less what is asked for, and slip, with the impulses so far. */
+/* Normal velocity less what the gap asks for, and slip, with the impulses so far. */
 static inline Two moves(const SolverRow *c) {
     const SolverBody *a = W.solver_bodies + c->a, *b = W.solver_bodies + c->b;
     Two v = plus(turned(c, minus(two(&a->x), two(&b->x))), two(c->free));
@@ -59,7 +58,7 @@ static inline double rolls(const SolverRow *c) {
     return a->rim * a->bend - b->rim * b->bend + c->spin;
 }
 
-/* How far the normal velocity is above what the gap asks for under a normal impulse. */
+/* By how much the normal velocity exceeds what the gap asks for at a normal impulse. */
 static inline double above(const SolverRow *c, double opens, double impulse) {
     return least(most(opens + c->gives * impulse, opens - c->more), opens + c->parts);
 }
@@ -89,7 +88,7 @@ static int body_of(int i) {
     return bodies++;
 }
 
-/* The levers of a row: what has no corners, and is no hinge, turns by friction alone. */
+/* Set the levers of a row. A disk turns by friction alone. */
 static void set_lever(const SolverRow *r, const Contact *c) {
     const SolverBody *a = W.solver_bodies + r->a, *b = W.solver_bodies + r->b;
     RowLever *l = lever_of(r);
@@ -100,7 +99,8 @@ static void set_lever(const SolverRow *r, const Contact *c) {
     l->slips = a->turn * l->own[0] * l->own[1] + b->turn * l->others[0] * l->others[1];
 }
 
-/* Have all rows so much of their impulses; what bounds a motor stays. */
+/* Multiply all impulses by a factor and compute the velocities anew. The bound of a motor, kept in its normal impulse,
+   stays. */
 static void scale(double by) {
     for (SolverBody *b = W.solver_bodies; b < W.solver_bodies + bodies; b++) b->x = b->y = b->rim = 0;
     for (SolverRow *r = W.rows; r < W.rows + rows; r++) {
@@ -111,14 +111,14 @@ static void scale(double by) {
     }
 }
 
-/* Have cohesion pull at the bodies of all rows. */
+/* Add the impulses of cohesion to the bodies. */
 static void cling(const Contact *list) {
     for (const SolverRow *r = W.rows; clings && r < W.rows + contacts; r++)
         push_row(r, wasm_f64x2_make(-list[r->from].clings, 0), 0);
 }
 
-/* Make rows of contacts, whose disks have got no impulses yet, and give them those that they begin with. What
-   cohesion pulls is no row's to choose: it is in the velocities that these begin with. */
+/* Make rows of contacts and give their bodies the impulses that these begin with. The impulses of cohesion are known: they
+   are part of the velocities without impulses. */
 void set_rows(Contact *list, int count) {
     W.solver_bodies[0] = (SolverBody){.disk = -1};
     bodies = 1;
@@ -185,8 +185,8 @@ void set_rows(Contact *list, int count) {
     scale(1);
 }
 
-/* Give contacts their impulses, and disks what these make of their velocities; of hinges, which may take thousands of
-   sweeps, summed anew: changes would drift by what they are rounded to. */
+/* Copy the impulses to the contacts and the new velocities to the disks. With hinges, which may take thousands of sweeps,
+   velocities are first summed up anew, as the rounding of all changes would add up. */
 void take_rows(Contact *list, int count) {
     if (W.swings_too) scale(1);
     for (int n = 0; n < count; n++) {
@@ -208,8 +208,8 @@ void take_rows(Contact *list, int count) {
 
 void begin_anew(void) { scale(0); }
 
-/* Give a row the normal impulse that keeps its gap closed, unless it has that from a corner, and the
-   friction that stops slip and rolling, as far as it is pressed. Return by how much they changed, m/s. */
+/* Solve one row: the normal impulse that keeps its gap from closing (if `in_corner`, `press_corner` has found it), and the
+   friction that stops slip and rolling, within its bound. Return the changes, m/s. */
 static inline Two give(SolverRow *c, int in_corner) {
     Two J = two(c->impulse), v = moves(c);
     double r = first(v), normal = c->impulse[0], moment = 0;
@@ -235,7 +235,7 @@ static inline Two give(SolverRow *c, int in_corner) {
     return speed;
 }
 
-/* How far a change of velocity (x, y) is from keeping all gaps closed, m/s. */
+/* By how much a change of velocity (x, y) misses what the gaps of some rows ask for, at most, m/s. */
 static double violation(const SolverRow *list, int count, double x, double y) {
     double worst = 0;
     for (const SolverRow *c = list; c < list + count; c++)
@@ -248,9 +248,9 @@ static double asks_at(const SolverRow *c, double x, double y) {
     return -above(c, x * c->normal[0] + y * c->normal[1] + c->free[0], c->impulse[0]);
 }
 
-/* The same for all that a disk touches and that does not give way, at once: in a narrow wedge impulses one by one
-   would take a thousand sweeps. The change of velocity becomes the one nearest to what it is without
-   them that keeps all gaps closed: itself, or on the bound of one surface, or of two. */
+/* Solve the normal impulses of all fixed surfaces that a disk touches at once: in a narrow wedge they would take a thousand
+   sweeps one by one. The change of velocity becomes the admissible one nearest to that without these impulses: itself, or on
+   the bound of one surface, or of two. Return the greatest change, m/s. */
 static double press_corner(SolverRow *list, int count) {
     SolverBody *d = W.solver_bodies + list->a;
     double x = d->x, y = d->y, m = d->mass, best[2] = {0, 0}, changed = 0;
@@ -295,9 +295,9 @@ static double press_corner(SolverRow *list, int count) {
     return changed;
 }
 
-/* Hasten the sweeps: go on where two of them, to and fro, lead to, by Nesterov's momentum, which begins anew
-   where it leads away from there (O'Donoghue and Candes, Found. Comput. Math. 15, 2015). `age` is how
-   often it went on; returns the next. */
+/* Nesterov's momentum after each two sweeps (there and back): go on in the direction in which they led. It restarts where the
+   sweeps lead back (O'Donoghue and Candes, Found. Comput. Math. 15, 2015). `age` counts the steps since a restart; returns
+   the next one. */
 static int hasten(int age) {
     double along = 0;
     for (const SolverRow *c = W.rows; c < W.rows + rows && age > 1; c++) {
@@ -326,16 +326,16 @@ static int hasten(int age) {
     return age + 1;
 }
 
-/* Sweep over the rows, those of one disk with what does not give way as one, until no relative velocity
-   changes by more than `accurate`; the first `plain` ones are not hastened. Return by how much one changed
-   in the last sweep, or INFINITY if the sweeps diverge. */
+/* Sweep over the rows until no relative velocity changes by more than `accurate`. All fixed surfaces of a disk are solved
+   together. The first `plain` sweeps have no momentum. Return the greatest change of the last sweep, m/s, or INFINITY if the
+   sweeps diverge. */
 double sweep_rows(int sweeps, int plain, double accurate) {
     double begins = 0, worst = 0, radius = 1 / W.solver_bodies[1].bend;
     int age = 0;
     for (int n = 0; n < sweeps; n++) {
         Two change = wasm_f64x2_splat(0);
-        /* To and fro, so that what one end of a pile does reaches the other in one sweep; in the last one
-           what does not give way comes last. */
+        /* There and back, so that a change at one end of a pile reaches the other end in one sweep. In the last sweep
+           fixed surfaces come last. */
         int to = (sweeps - n) % 2;
         worst = 0;
         if (n >= plain && (n - plain) % 2 == 0) age = hasten(n == plain ? 0 : age);
@@ -364,7 +364,7 @@ double sweep_rows(int sweeps, int plain, double accurate) {
     return worst;
 }
 
-/* The same by fours, if there are enough of them; INFINITY, too, where that is left to `sweep_rows`. */
+/* Sweep by fours, if there are enough rows; INFINITY if there are not, or if the sweeps diverge. */
 double sweep_lightly(int sweeps, int plain, double accurate) {
     double most = DIVERGES * (W.soft + W.skip / W.solver_bodies[1].bend);
     if (rows < LARGE) return INFINITY;
@@ -373,16 +373,15 @@ double sweep_lightly(int sweeps, int plain, double accurate) {
     return worst;
 }
 
-/* Slopes of the cost along all impulses J, at two shares of them. The cost is 1/2 J W J + J q, W J their changes
-   of velocity: what sweeps make least, one contact after the other. W J + q is how far the velocities are
-   from what the contacts ask for; see docs/physics.md. */
+/* Slopes of the cost 1/2 J W J + J q along the impulses J, at two shares of them. W J are the changes of velocity, and
+   W J + q is the difference between the velocities and what the contacts ask for (docs/physics.md, "The law of a solve"). */
 static Two slopes(double one, double other) {
     Two share = wasm_f64x2_make(one, other), sum = wasm_f64x2_splat(0);
     for (const SolverRow *c = W.rows; c < W.rows + rows; c++) {
         Two change = minus(moves(c), two(c->free));
         Two opens = plus(wasm_f64x2_splat(c->free[0]), times(first(change), share));
         Two slips = plus(wasm_f64x2_splat(c->free[1]), times(second(change), share));
-        /* As `above`, of both. */
+        /* `above` for both shares. */
         Two gives = plus(opens, times(c->gives, times(c->impulse[0], share)));
         gives = wasm_f64x2_pmax(minus(opens, wasm_f64x2_splat(c->more)), gives);
         gives = wasm_f64x2_pmin(plus(opens, wasm_f64x2_splat(c->parts)), gives);
@@ -394,11 +393,9 @@ static Two slopes(double one, double other) {
     return sum;
 }
 
-/* Take the share of all impulses at which the cost is least; 0 if that is all of them. The slope grows with it:
-   straight from `none` to `all`, below that where what an overlap asks for ends at its most, above where it ends
-   at what keeps it as deep: there it is looked for between two shares, halfway and where the straight line from one to
-   the other is zero. Where sweeps end, the impulses do no work so on the velocities that they leave, however far the
-   sweeps had come: W J + q times J is at most 0. */
+/* Line search: scale all impulses by the share in [0, 1] at which the cost is least; return 0 if that is 1. Then
+   J (W J + q) <= 0, however far the sweeps have come: the law of a solve. The slope increases with the share. It is
+   piecewise linear, as overlaps ask for less up to a bound, so its zero is bracketed by bisection and secants. */
 int lessen(void) {
     Two ends = slopes(0, 1);
     double none = first(ends), all = second(ends), share = 0, from = 0, to = 1, below = none, above = all;
@@ -423,8 +420,7 @@ int lessen(void) {
     return 1;
 }
 
-/* Take back friction beyond what contacts allow: sweeps that did not come to an end have pressed less
-   since. */
+/* Cut friction down to its bound. It may exceed that where sweeps were cut off, as normal impulses have changed since. */
 void keep_bounds(void) {
     for (SolverRow *c = W.rows; c < W.rows + rows; c++) {
         double bound = c->rough * c->impulse[0], arm = c->arm * c->impulse[0];
@@ -437,7 +433,8 @@ void keep_bounds(void) {
     }
 }
 
-/* Take back what rounding presses; with endless friction even that would pull. Return whether there was any. */
+/* Remove normal impulses of the size of rounding: with unbounded friction even these would pull. Return whether there were
+   any. */
 int drop_noise(void) {
     int dropped = 0;
     for (SolverRow *c = W.rows; c < W.rows + contacts; c++) {
@@ -451,7 +448,7 @@ int drop_noise(void) {
     return dropped;
 }
 
-/* By how much gaps close faster than they are asked to, at most, m/s. */
+/* By how much gaps miss what they ask for, at most, m/s. */
 double left_open(void) {
     double worst = 0;
     for (const SolverRow *c = W.rows; c < W.rows + rows; c++) worst = most(worst, -above(c, first(moves(c)), c->impulse[0]));

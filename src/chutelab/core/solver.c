@@ -1,48 +1,47 @@
-/* Lasting contacts, once a step: impulses such that no gap is negative at the step's end, and that
+/* Lasting contacts are solved once per step: impulses such that no gap is negative at the end of the step, and such that
    friction, within its bound, brings the slip in the middle of the step to zero.
 
-   Contact dynamics after Moreau and Jean: projected Gauss-Seidel, started from the impulses of the
-   step before. The gap at the end is that of the path without impulses, to the true surface: so
-   curves, ends and rolling over each other need no cases. What rests hops by g h^2/8 in each step
-   and is where it was at its end; positions at the steps are of second order in h. */
+   This is contact dynamics after Moreau and Jean, by projected Gauss-Seidel, started from the impulses of the step before.
+   The gap at the end is that of the path without impulses to the true surface, so curves, ends and disks that roll over each
+   other need no special cases. A particle at rest hops by g h^2/8 in each step and is back at its end; positions at the
+   steps are of second order in h. */
 
 #include "core.h"
 
-/* Of the greatest change where sweeps diverge: contacts that change by so much are lowered. */
+/* Where sweeps diverge, friction is lowered of contacts that change by this share of the greatest change. */
 #define FOLLOWS 0.01
-/* Times that friction is lowered, to a quarter and at last to nothing. */
+/* How often friction is lowered: to a quarter each time, at last to 0. */
 #define TRIES 4
-/* Contacts; an island of fewer is swept so many times as often where its gaps need it: disks that
-   moving surfaces draw into a wedge take up to thousands of sweeps, or sink into each other. */
+/* An island of n contacts may be swept SMALL / n times as often, up to MOST_ROUNDS, if its gaps need that: disks that moving
+   surfaces draw into a wedge take up to thousands of sweeps, or sink into each other. */
 #define SMALL 500
 #define MOST_ROUNDS 50
-/* Sweeps before they are hastened: most solves need no more. */
+/* Sweeps without momentum: most solves need no more. */
 #define PLAIN 6
-/* Radii by which a gap may be off where the way bends; times its last change up to which it is solved
-   for once more. */
+/* Inside arcs a lone disk is solved again until its gap changes by less than FINE radii, as long as each change is less
+   than SHRINKS times the last one. */
 #define FINE 1e-8
 #define SHRINKS 0.9
-/* Times the change at the end of the first round: sweeps that have not crawled to less in the last one
-   press harder by as much in each, without end. */
+/* If the last round ends with more than this share of the change at the end of the first, the sweeps press harder each time,
+   without end. */
 #define CRAWLS 0.5
-/* m/s on Earth; changes at which sweeps over a few contacts of what has corners, joints or hinges end. */
+/* m/s at 1 g; change at which sweeps over few contacts end if there are corners, joints or hinges. */
 #define FINE_FEW 1e-11
-/* ... and over many, of those of disks: a pile of boxes hangs together by more, and else does not come to rest. */
+/* The same over many contacts, as a share of that of disks: with less a pile of boxes does not come to rest. */
 #define CROWD_CORNERS 0.3
-/* ... and the share of their sweeps that it gets while something in it stirs: what others would do, the next step does
-   as well. */
+/* Share of the sweeps that a pile of boxes gets while something in it moves: the next step continues them anyway. */
 #define FEWER 0.5
-/* Share of its bound up to which friction is not all used: it holds. */
+/* Friction below this share of its bound holds. */
 #define HOLDS 0.999
 
 /* Whether a surface that moves drives a disk. */
 static int drives(const Contact *c) { return c->j < 0 && c->other[1] - c->moved[1] != 0; }
-/* Whether a surface runs or comes on, as hard as it must. */
+/* Whether a surface drives or pushes, with any force that it takes. */
 static int presses(const Contact *c) { return drives(c) || c->moved[0] > 0; }
 
-/* Stall the drives, for this step, of disks that do not turn and that block them: contacts that change by
-   `least`, m/s, or more, and rough ones that slip by more than `enough` though their friction is not all used.
-   Return whether there is one. */
+/* Stop, for this step, the drives that are blocked by disks that cannot turn. A drive is blocked if its contact changes by
+   `least` m/s or more, or if its friction is practically unbounded and holds, but the disk slips by more than `enough`. Return
+   whether there is one. */
 static int stall(Contact *list, int count, double least, double enough) {
     int stalled = 0;
     for (SolverRow *r = W.rows; r < W.rows + count; r++) {
@@ -60,7 +59,7 @@ static int stall(Contact *list, int count, double least, double enough) {
     return stalled;
 }
 
-/* Lower the friction, to a share of it, of rows that the last sweep changed by `least` m/s or more. */
+/* Multiply the friction of rows that the last sweep changed by `least` m/s or more by a factor. */
 static void ease_friction(Contact *list, int count, double least, double by) {
     for (SolverRow *r = W.rows; r < W.rows + count; r++) {
         Contact *c = list + r->from;
@@ -71,18 +70,20 @@ static void ease_friction(Contact *list, int count, double least, double by) {
     }
 }
 
-/* Solve contacts by `sweeps` until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
-   will do, but not before the last round if they are to be finer than a crowd's. A crowd is swept again, up to so
-   many rounds, of which the last is good enough if it crawls, and more finely where small changes leave gaps
-   open. By itself (0 rounds), and where sweeps diverge,
-   rigid bodies with all of the friction may have no solution, driven into a wedge that locks itself:
-   there it is lowered until they have one. Gaps tell nothing of that where a drive presses: it presses
-   harder in each sweep, so there the changes have to end, too. A disk that cannot turn is held where
-   friction locks, and would slip away from a lower one: it stalls the drive, for this step, and so does
-   one that others block on a belt that grips without bound, which never slips.
+/* Solve the contacts of an island (`rounds` > 0), or of one disk (0).
 
-   They begin with the impulses of the step before, as far as these lower the cost: where contacts have
-   opened, what had been pressed between others would throw disks out. */
+   A round is `sweeps` sweeps, until changes are at most `accurate`, m/s. It is good enough as well if gaps miss what they ask
+   for by at most `enough`, m/s; contacts that need finer changes than a crowd's get all rounds for them. Small changes that
+   leave gaps open are swept on ten times as finely. After the last round it is good enough if the changes still shrink.
+
+   Else, and where sweeps diverge, the rigid bodies may have no solution: they are driven into a wedge that locks itself. Then
+   friction is lowered, from contacts that change most, until there is one. If a drive presses, it presses harder in each
+   sweep: closed gaps alone prove nothing there, the changes have to end, too. A disk that cannot turn, held by friction that
+   locks, would slip through if friction were lowered: it stalls the drive for this step. So does a disk that is blocked on a
+   belt with practically unbounded friction.
+
+   The impulses of the step before are taken as far as they lower the cost, see `lessen`: where a contact has opened, those of
+   its neighbours would throw disks out. */
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough) {
     double first = INFINITY;
@@ -91,7 +92,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
         const Contact *c = list + n;
         driven |= drives(c);
         pressing |= presses(c);
-        /* What may have to stall tells so by how it changes, sweep by sweep. */
+        /* Plain sweeps show by their changes what has to stall. */
         if (drives(c) && c->friction > ROUGH && W.disks[c->i].inertia == 0) plain = sweeps;
     }
     set_rows(list, count);
@@ -131,8 +132,8 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
     take_rows(list, count);
 }
 
-/* What the impulses of a step change of a gap at its end, m, but for the straight way along its normal:
-   the surface may bend, and friction changes how far the disk gets on it. */
+/* By how much the impulses of a step change the gap at its end, m, other than along the straight path: the surface bends, and
+   friction changes how far the disk gets along it. */
 static double bends(const Contact *c, double h) {
     double u[3], v[3], hollow = 0, later;
     if (c->leaves || c->need == -INFINITY || is_flat(W.surfaces + (-1 - c->j))) return 0;
@@ -143,8 +144,8 @@ static double bends(const Contact *c, double h) {
     return later - c->free_gap - h * (v[0] - u[0]);
 }
 
-/* Solve the contacts of a disk by itself so that gaps are closed where its impulses lead to: again with
-   what bends, as long as that changes less each time. Else it would sink into a hollow, step by step. */
+/* Solve the contacts of a lone disk such that its gaps are closed at the place that its impulses lead to, by repeating the solve
+   as long as corrections shrink. Else it would sink into the inside of an arc, step by step. */
 static void solve_alone(Contact *list, int count) {
     double h = W.step_end - W.t, r = W.disks[list->i].radius;
     for (double last = INFINITY;;) {
@@ -161,8 +162,8 @@ static void solve_alone(Contact *list, int count) {
     }
 }
 
-/* Where the slip of a disk by itself turns round within a step, since friction cannot hold it, the
-   friction turns too. The sweeps would bring the slip to zero, which is wrong in first order. */
+/* Where the slip of a lone disk reverses within a step because friction cannot hold it, friction reverses at that instant.
+   The sweeps would bring the slip to zero, which is wrong in first order. */
 static void turn_slip(Contact *c) {
     double h = W.step_end - W.t, past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0, u[3], v[3];
     double span = past + 0.5 * h, pull = c->pull, hold = c->friction * c->impulse[0];
@@ -178,8 +179,8 @@ static void turn_slip(Contact *c) {
     c->impulse[1] += change[1];
 }
 
-/* Sort the contacts by islands of disks that touch each other, in the order in which these begin;
-   within one they keep theirs. What the contacts of the step before were is not needed any more. */
+/* Sort the contacts by islands of disks that touch each other; within an island they keep their order. This overwrites the
+   contacts of the step before, which are not needed any more. */
 static void sort_by_islands(void) {
     int *parent = W.queue, *first = W.moved, *next = W.links;
     for (EACH_LIVE(i)) {
@@ -188,7 +189,7 @@ static void sort_by_islands(void) {
     }
     for (int n = 0; n < W.contact_count; n++)
         if (W.contacts[n].two) parent[island_of(W.contacts[n].i)] = island_of(W.contacts[n].j);
-    /* What touches hinges is one island. */
+    /* All disks that touch hinges are one island. */
     for (int n = 0, hung = -1; n < W.contact_count && W.hinges; n++) {
         if (!W.contacts[n].hung) continue;
         if (hung >= 0) parent[island_of(W.contacts[n].i)] = island_of(hung);
@@ -200,7 +201,7 @@ static void sort_by_islands(void) {
         one &= W.contacts[n].island == root;
     }
     if (one) return;
-    /* Of each island a list of its contacts, which begins with its last. */
+    /* A linked list of contacts for each island. */
     for (int n = W.contact_count - 1; n >= 0; n--) {
         int k = W.contacts[n].island;
         next[n] = first[k];
@@ -217,10 +218,9 @@ static void sort_by_islands(void) {
     W.earlier = c;
 }
 
-/* Note how far the step's impulses are from solving it: the overlap, in radii, that they leave beyond what is
-   asked for, and by how much they break the law of energy: the kinetic energy after them, less that
-   before, plus that of the change itself, is at most what moving surfaces give and what the contacts
-   ask for. What is on its left is summed over disks, what is on its right over contacts. */
+/* Measure how well the impulses solve the step. `unsolved`: the overlap, in radii, that they leave beyond what is asked for.
+   `gained`: by how much they break the law K(v) - K(u) + K(v - u) <= J s + sum J_n a_n - J_t d_t (docs/physics.md, "The law of
+   a solve"); the left side is summed over disks, the right side over contacts. */
 static void check_solve(int again) {
     static double last;
     double gained = 0, h = W.step_end - W.t;
@@ -245,7 +245,7 @@ static void check_solve(int again) {
         if (c->hung) gained += hinge_share(c);
     }
     if (W.swings_too) gained += gained_by_hinges();
-    /* What is solved for again counts once. */
+    /* A step that is solved again counts once. */
     W.gained += MAX(gained, 0) - (again ? last : 0);
     last = MAX(gained, 0);
 }
@@ -270,8 +270,8 @@ void solve_contacts(int again) {
             stirred |= (a->supports && a->rest == 0) || (b->supports && b->rest == 0);
         }
         swings |= W.swings_too;
-        /* A drive presses as hard as it must: there no spring would hold, so that it gives no more than
-           what parts, and friction is lowered. */
+        /* A drive presses with any force, so no spring would stop it. There the spring gives way by no more than what removes
+           the overlap, and friction is lowered if need be. */
         for (int n = from; n < to && !again; n++) {
             W.contacts[n].gives /= heaviest;
             if (!driven) W.contacts[n].parts = INFINITY;

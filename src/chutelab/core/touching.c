@@ -1,30 +1,29 @@
-/* What touches at the beginning of a step, and what each contact needs: the change of normal velocity
-   that keeps its gap closed at the step's end. */
+/* Find the contacts at the beginning of a step, and what each of them needs: the change of normal velocity such that its
+   gap is not negative at the end of the step. */
 
 #include "core.h"
 
-/* Overlap that is left alone, in radii; what is beyond is parted in a step as far as gravity makes two meet as fast,
-   else a tenth of it, PART, and of an overlap as deep as DEEP more, up to all. It parts like a spring that GIVES, of
-   stiffness PART / GIVES M / step^2, M the heaviest mass of the island: what is wedged cannot part, and without a
-   bound its impulses would grow in each sweep. What does part goes by MOST_PARTED radii in a step, no
-   more: gently, since parting does work, and where a wedged chain opens the speeds add up; less, and
-   the impulses of such a chain take many times the sweeps. */
+/* Removal of overlaps, in radii. Up to SLOP an overlap stays. Of what is beyond, a step removes as much as opens the contact
+   no faster than 2 g dt, at least the share PART, and all of it from DEEP on, but no more than MOST_PARTED: removal does
+   work, and where a wedged chain opens the speeds of its contacts add up. (With a smaller bound such a chain takes many
+   times the sweeps.) The contact gives way like a spring of stiffness PART / GIVES M / step^2, with M the heaviest mass of the
+   island: rigid particles wedged between walls cannot part, and their impulses would grow in each sweep. */
 #define SLOP 5e-4
 #define PART 0.1
 #define DEEP 0.03
 #define MOST_PARTED 1e-2
 #define GIVES 3e-3
-/* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
+/* Gap, in radii, up to which a contact that was pressed still touches: sweeps leave gaps so wide. */
 #define LEAVE 1e-4
 
-/* The gap at the end of the step on the path as it is; of a surface also how the way bends there, see
-   `bending`, if that is asked for. */
+/* The gap at the end of the step on the path without impulses; for a surface also the curvature of the path along it, see
+   `bending`, if `bends` is not null. */
 double gap_later(const Contact *c, double h, double *bends) {
     const Disk *a = W.disks + c->i;
     double x = a->x + (a->vx + 0.5 * W.gx * h) * h, y = a->y + (a->vy + 0.5 * W.gy * h) * h, nx, ny;
     if (c->j < 0) {
         const Surface *s = surface_at(-1 - c->j, a->t + h), *then = face_at(s, x, y);
-        /* From afar it comes to no other piece than the one that the normal is of. */
+        /* From a distance a disk can only come to the piece that the normal belongs to. */
         if (then != s && c->gap > TOUCH * a->radius) return INFINITY;
         if (bends) *bends = bending(then, x, y, a->radius);
         return gap_to(then, x, y, a->radius, &nx, &ny);
@@ -35,8 +34,8 @@ double gap_later(const Contact *c, double h, double *bends) {
     return sqrt(x * x + y * y) - a->radius - b->radius;
 }
 
-/* Time until the foot of a disk on a face passes its end, INFINITY where there is none or the face
-   goes on smoothly, and not so bent that the disk flies on. */
+/* Time until the contact point of a disk passes the end of the face. INFINITY if there is no end, or if the face continues
+   smoothly without a bend at which the disk would fly off. */
 static double time_on_face(const Contact *c) {
     const Disk *d = W.disks + c->i;
     const Surface *s = surface_at(-1 - c->j, d->t);
@@ -49,7 +48,7 @@ static double time_on_face(const Contact *c) {
         along = x * s->tx + y * s->ty;
         run = v[0] * s->tx + v[1] * s->ty;
     } else {
-        /* Angles; the foot of a disk in contact turns with its centre. */
+        /* In angles: the contact point turns with the centre of the disk. */
         double half = acos(s->cos_half), square_away = x * x + y * y;
         if (square_away == 0) return INFINITY;
         along = atan2(s->tx * y - s->ty * x, s->tx * x + s->ty * y) + half;
@@ -67,13 +66,13 @@ static double time_on_face(const Contact *c) {
     return (run > 0 ? length - along : along) / fabs(run);
 }
 
-/* When a load (N s of impulse per time, newest first) falls to nothing, by the line through two. */
+/* Time at which a load (N, newest first) becomes 0, extrapolated from two values. */
 double time_unloaded(const double *load, const double *t) {
     return load[1] > load[0] ? t[0] + load[0] / (load[1] - load[0]) * (t[0] - t[1]) : INFINITY;
 }
 
-/* The change of velocity along its normal that brings a disk of a crowd where its gap is `aim` at the
-   step's end, m/s: in a hollow the wall bends towards it on its way. */
+/* The change of velocity along its normal, m/s, such that the gap of a disk inside an arc is `aim` at the end of the step:
+   the wall bends towards the disk on its way. */
 static double closes(const Contact *c, double aim, double h) {
     const Disk *d = W.disks + c->i;
     double need = c->need, nx, ny;
@@ -88,8 +87,8 @@ static double closes(const Contact *c, double aim, double h) {
     return need;
 }
 
-/* Add a contact if it touches and hardly approaches, of what has corners at a place, or as it was; `least` is the smaller
-   radius. */
+/* Add a contact if the two touch and approach slowly, up to `bound`. With corners it is that at `place`, or continues the
+   contact `still`. `least` is the smaller radius. Return 0 if there is no room. */
 static int add(int i, int j, double least, double bound, double h, const Touch *place, const Contact *still) {
     if (W.contact_count >= W.contact_room) return 0;
     Contact *c = W.contacts + W.contact_count;
@@ -101,33 +100,32 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     else if (place) describe_touch(c, i, j, place);
     else describe(c, i, j);
     if (place || still) haste += 2 * h * (whirl_of(d) + (j < 0 ? 0 : whirl_of(W.disks + j)));
-    /* The next face or pulley that a disk by itself slides on to may be further off. */
+    /* A face or pulley that a lone disk is about to slide onto may be further away. */
     int far = c->gap > TOUCH * least, cornered = place || still;
     if (far && (W.interact || j >= 0 || !d->supports)) return 1;
     later = c->free_gap = still ? c->free_gap : place ? place->later : gap_later(c, h, 0);
     c->bend = 0;
     if (far && later > 0) return 1;
     relative(c, 0, u);
-    /* A blow has just lifted it off: it flies. */
+    /* An impact has just lifted it off: it is in flight. */
     if (!W.interact && !W.tracks[i].lasted && flies_off(d, -1 - j, u[0])) return 1;
-    /* What has sunk in counts however it moves: else what parts others would press it, or what knocks
-       on it in each step. */
+    /* A contact with an overlap counts however it moves. Else it would be pressed deeper when other overlaps are removed, or
+       be struck in each step. */
     double cohesion = cohesion_of(i, j);
     const Contact *last = place ? place_before(c) : still;
     for (int k = cornered ? -1 : d->before; k >= 0; k = W.earlier[k].next)
         if (goes_on(W.earlier[k].j, j)) last = W.earlier + k;
-    /* N s; what cohesion has held since the step before: of a new contact, what it would have held since the
-       latest blow or release. */
+    /* N s; impulse of cohesion since the step before; for a new contact since the latest impact or release. */
     double parts = MAX(W.soft + haste, soft_approach(d, least)), since = d->since;
     if (j >= 0) since = MAX(since, W.disks[j].since);
     double past = last ? 0.5 * W.length_before : MIN(MAX(W.t - since, 0), W.length_before), held = cohesion * past;
     if (cohesion > 0) parts = last ? INFINITY : MAX(parts, held / c->mass[0]);
     if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > parts)) return 1;
-    /* Cohesion holds a gap that opens as it is; it never closes one. */
+    /* Cohesion keeps a gap from opening; it never closes one. */
     double aim = cohesion > 0 ? MIN(MAX(later, 0), c->gap) : 0, closed;
     closed = aim = MIN(c->gap, aim);
     if (c->gap < -SLOP * least) {
-        /* A shorter step parts less, with the same speed: else it would give so much more energy. */
+        /* A shorter step removes less, at the same speed; else it would give more energy. */
         double share = MIN(h / W.usual, 1), beyond = c->gap + SLOP * least;
         double part = MAX(MAX(PART, -c->gap / (DEEP * least)), -W.soft * W.step / beyond);
         aim = -SLOP * least + (1 - share * MIN(part, 1)) * beyond;
@@ -140,15 +138,15 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     c->parts = (aim - closed) / h;
     c->drift = 0.5 * h * c->pull;
     if (cornered && W.g == 0) {
-        /* Without weight nothing hops by more than it fell: what it would begin with is given by nothing. */
+        /* Without weight no hop is larger than the fall before it: nothing would supply the energy. */
         c->need = MIN(c->need, c->parts + MAX(-2 * u[0], 0));
         c->drift = MIN(MAX(c->drift, -fabs(u[1])), fabs(u[1]));
     }
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     for (int n = 0; n < 3 && last; n++) c->impulse[n] = W.again * last->impulse[n];
     int was_pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
-    /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
-       above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
+    /* A disk that was pressed comes down from its last hop. It may leave along the surface, not into it, and until it
+       reaches the end of the face it hops. Beyond, the end presses it only if it is slow enough. */
     double floor = -u[0], until = j < 0 && !cornered ? time_on_face(c) : INFINITY, least_need = floor;
     if (until < h) {
         const Surface *s = surface_at(-1 - j, d->t);
@@ -162,11 +160,11 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     if (gone && !was_pressed) return 1;
     if (!gone) c->clings = held + 0.5 * cohesion * h;
     if (gone) c->need = -INFINITY;
-    /* A load that wears off leaves nothing to stop; friction goes on as long as the load does, not to
-       the middle of the step. */
+    /* If the load becomes 0 within the step, there is no approach to stop, and friction acts only until then, not to the
+       middle of the step. */
     const Track *track = W.tracks + i;
     double wears = W.interact || ends ? INFINITY : time_unloaded(track->load, track->load_t) - W.t;
-    /* In a corner the other surface may press it on this one. */
+    /* In a corner the other surface may press it onto this one. */
     int alone = d->supports <= 1 || gone;
     c->leaves = was_pressed && !cornered && cohesion == 0 && alone && wears > 3 * h && c->gap <= LEAVE * least && c->need < least_need;
     if (c->leaves || gone) {
@@ -186,8 +184,8 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     return 1;
 }
 
-/* Put a disk where it is when its foot comes to the end of the face that it slides along. Straight on
-   it would be inside a hollow face by then, and far above a round one. */
+/* Put a disk where it is when its contact point reaches the end of the face that it slides along. A straight path would
+   lead into the inside of an arc, and far away from its outside. */
 static void at_the_end(const Contact *c, Disk *d) {
     const Surface *s = surface_at(-1 - c->j, d->t);
     double nx = c->nx, ny = c->ny, v[3];
@@ -207,8 +205,8 @@ static void at_the_end(const Contact *c, Disk *d) {
     d->vy = v[1] - along * nx;
 }
 
-/* A disk that leaves all surfaces in this step, over the end of a face, is carried until then: it
-   gets what gravity takes from it up to there. */
+/* A disk that leaves all surfaces in this step over the end of a face is supported up to that end: it gets the impulse of
+   its weight until then. */
 static void carry_to_end(int i, int first, double h) {
     const Disk *d = W.disks + i;
     Contact *last = 0;
@@ -222,7 +220,7 @@ static void carry_to_end(int i, int first, double h) {
         }
     }
     if (!last) return;
-    /* From the end on it falls; whatever it would fall into in as long as a step carries it on. */
+    /* From the end on it falls. If it would fall into another surface within a step, that one supports it. */
     Disk then = *d;
     at_the_end(last, &then);
     advance(&then, then.t + h);
@@ -238,24 +236,24 @@ static void carry_to_end(int i, int first, double h) {
     last->need += 0.5 * MAX(press, 0) * until;
 }
 
-/* The places at which a particle with corners touches something, as they are now, or still are. */
+/* The places at which a particle with corners touches something: looked up now, or those of the step before. */
 typedef struct { Touch now[MOST_TOUCHES]; const Contact *still[MOST_TOUCHES]; int count, are_still; } Places;
 
-/* Add a contact at each. */
+/* Add a contact at each place. */
 static RARELY int add_places(int i, int j, double bound, double h, const Places *at) {
     for (int n = 0; n < at->count; n++)
         if (!add(i, j, inner_of(i, j), bound, h, at->are_still ? 0 : at->now + n, at->are_still ? at->still[n] : 0)) return 0;
     return 1;
 }
 
-/* List them for a step of a length h; return how many. */
+/* List the places for a step of length h; return how many. */
 static int list_places(int i, int j, double h, Places *at) {
     at->count = at->are_still = list_still(i, j, h, at->still);
     if (!at->count) at->count = list_touches(i, j, W.t, TOUCH * inner_of(i, j), W.t + h, at->now);
     return at->count;
 }
 
-/* List the contacts of the step, waking sleepers that are touched; 0 if there is no room. */
+/* List the contacts of the step and wake the sleepers among them. Return 0 if there is no room. */
 int find_contacts(double h, int *woke) {
     Places places;
     W.contact_count = 0;
@@ -267,7 +265,7 @@ int find_contacts(double h, int *woke) {
         double least = MIN(a->radius, b->radius), reach = a->radius + b->radius + TOUCH * least;
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
         if (cornered && !list_places(i, j, h, &places)) continue;
-        /* What the step before left over is taken up here. */
+        /* Slow approaches that the step before has left become contacts here. */
         int impacts = MAX(a->impacts, b->impacts);
         double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least, 0);
         if (cornered) bound = MAX(bound, left_over(b, impacts, -1, least, 0));

@@ -1,23 +1,23 @@
-/* Drag of still air on disks, which count as spheres, and on boxes and polygons, which count as spheres whose disk has
-   their area: with Schiller's and Naumann's coefficient, as in `theory.drag`. What rides or sleeps is held against it.
+/* Drag of still air on particles: the coefficient of Schiller and Naumann for spheres, as in `theory.drag`. Disks count
+   as spheres of their radius, boxes and polygons as spheres whose disk has their area. Riders and sleepers feel no drag.
 
-   A step is split (Strang): half of what air does in it comes before the flight, half after it. So paths are
-   parabolas between two steps, and of second order in the step. A blow comes with
-   what air has done by then. */
+   A step is split (Strang): drag acts for half of the step before the flight and for the other half after it. So paths
+   are parabolas between two steps, and of second order in the step. At an impact, drag is applied up to its instant
+   first. */
 
 #include "core.h"
 
 #define PI 3.14159265358979323846
 #define VISCOSITY 1.8e-5 /* Pa s; of air at 20 degrees */
 
-/* Deceleration over speed, 1/s. */
+/* Deceleration divided by speed, 1/s. Newton's constant coefficient 0.44 holds from a Reynolds number of 1000 on. */
 static double relief(const Disk *d, double speed) {
     double r = d->broad, reynolds = 2 * r * speed * W.air / VISCOSITY, area = PI * r * r;
     if (reynolds >= 1000) return 0.22 * W.air * area * speed * d->inv_mass;
     return 6 * PI * VISCOSITY * r * (1 + 0.15 * pow(reynolds, 0.687)) * d->inv_mass;
 }
 
-/* Have air slow a disk down for the time up to t since it did last; before that, take it back. */
+/* Apply the drag of the time since it last acted on a disk up to t; if t is earlier, undo it. */
 void slow_down(int i, double t) {
     Disk *d = W.disks + i;
     double h = t - d->aired, speed = sqrt(square(d->vx) + square(d->vy));
@@ -32,7 +32,7 @@ void slow_down(int i, double t) {
     W.air_loss += lost;
 }
 
-/* Begin a step of which this is the middle, once; what flies has its state noted as of its beginning. */
+/* Apply drag at the beginning of a step up to its middle, once; for a particle in flight, its state is noted first. */
 void begin_in_air(int i, double middle) {
     const Disk *d = W.disks + i;
     if (d->aired == d->t && !W.tracks[i].lasted) track_flying(i);

@@ -1,17 +1,18 @@
-/* After the solve of a step: what lasting contacts do to the ledger, which of them stick, slip or open,
-   which disks come to rest, and how tracks end in contact. */
+/* After the solve of a step: what lasting contacts do to the ledger, which of them stick, slip or open, which disks come
+   to rest, and how tracks end in contact. */
 
 #include "core.h"
 
-/* Steps that a contact in a crowd lasts at least if its end is told as a separation. */
+/* Smallest number of steps that a contact in a crowd has to last for its end to be recorded as a separation. */
 #define LASTS 10
-/* m/s on Earth, and so is STOPPED; below it contacts of a crowd are calm: `settled` in the contract. */
+/* m/s on Earth; contacts of a crowd below this speed are calm, see `settled` in the contract. STOPPED is for the same
+   gravity. */
 #define CALM 1e-3
-/* m/s; of a disk by itself: what is left of a speed that has come to nothing. */
+/* m/s; the same for a disk by itself: less is the rounding of a speed that has become zero. */
 #define STOPPED 1e-9
 
-/* How long ago the foot of a disk passed the end at which it comes on to a surface, s, and the direction of the
-   surface there; below 0: it will. 0 where it is none within a step. */
+/* Time since the foot of a disk passed the end at which it moves onto a surface, s, negative if it has not yet; and the
+   tangent of the surface there. 0 if it passes none within a step. */
 static double since_passage(const Contact *c, double *way) {
     const Disk *d = W.disks + c->i;
     const Surface *s = surface_at(-1 - c->j, d->t);
@@ -32,8 +33,8 @@ static double since_passage(const Contact *c, double *way) {
     return since;
 }
 
-/* Tell that a disk has gone over to another surface without a blow, when it did: as fast along both as its
-   last two steps on the one before lead to. */
+/* Record that a disk has moved onto another surface without an impact, at the time when it did. Position and velocity
+   there are extrapolated from its last two steps on the surface before, along the tangent of both. */
 static void tell_passage(const Contact *c, int kind) {
     const Disk *d = W.disks + c->i;
     const Track *track = W.tracks + c->i;
@@ -50,19 +51,19 @@ static void tell_passage(const Contact *c, int kind) {
     write_event(kind, c->i, -1, c->owner, t, then, then + 2, then + 2, 0, 0);
 }
 
-/* Tell of a disk that came to lie on a surface without a blow before: the contact's impulse since then counts as one,
-   and no more among what lasts, if it is all that the disk got. */
+/* Record that a disk came to lie on a surface without an impact before: the contact's impulse since then counts as that
+   of an impact. If it is the only impulse on the disk, it is taken off the lasting ones. */
 static void tell_arrival(const Contact *c, int kind, double past, double h) {
     const Disk *d = W.disks + c->i;
     write_event(kind, c->i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);
     if (is_alone(c, &d->ux)) keep_impulse(c, -1, W.t - past, W.t + 0.5 * h);
 }
 
-/* Note whether a disk that lasts on one surface slips there, sticks, or has come to rest. */
+/* Record whether a disk in contact with one surface slips there, sticks, or has come to rest. */
 static void note_grip(Disk *d, const Contact *c, const double *u, const double *v, double h) {
     int i = c->i;
     double most = c->friction * c->impulse[0], slip = v[1] + c->drift;
-    /* The impulses stand for the second half of the last step, if it lasted, and the first of this. */
+    /* The impulses act for the second half of the last step, if the contact lasted, and the first half of this one. */
     double past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0, span = past + 0.5 * h;
     int grips = fabs(c->impulse[1]) < most * (1 - 1e-12) || (most == 0 && slip == 0 && c->drift == 0);
     Track *track = W.tracks + i;
@@ -73,7 +74,7 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     track->load[0] = c->impulse[0] / span;
     track->load_t[0] = d->t;
     if (d->on < 0) {
-        /* It came to lie there without an impact that was told. */
+        /* It came to lie there without an impact that was recorded. */
         tell_arrival(c, IMPACT, past, h);
         d->slips = 1;
     } else if (d->on != c->owner) {
@@ -82,7 +83,8 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     }
     d->on = c->owner;
     if (grips && d->slips) {
-        /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
+        /* Friction slows the slip at a constant rate; from the middle of the last step on, the slip takes this long to
+           vanish. */
         double s = u[1] - c->pull * past, pull = c->pull;
         double rate = most / (c->mass[1] * span) - (s > 0 ? pull : -pull);
         double t = d->t - past + (rate > 0 ? MIN(fabs(s) / rate, span) : 0);
@@ -96,24 +98,24 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     d->slips = !grips;
 }
 
-/* Whether a disk by itself that grips stays as it is: nothing pulls it along, and on what is round, or
-   slows its rolling, it has stopped. */
+/* Whether a disk by itself that grips will stay as it is: nothing pulls it along, and it has stopped if its surface is
+   round or its rolling is slowed. */
 static int lies(const Disk *d, const Contact *c, double h) {
     const Surface *s = surface_at(-1 - c->j, d->t);
     double speed = fabs(d->vx + 0.5 * h * W.gx) + fabs(d->vy + 0.5 * h * W.gy);
     if (W.stirs || (s->speed != 0 && c->owner != W.landing)) return 0;
     if (bending(s, d->x, d->y, d->radius) != 0 && (speed > STOPPED * W.pace || c->other[1] != 0)) return 0;
     if (c->arm > 0 && fabs(d->spin - c->other[2]) * d->radius > STOPPED * W.pace) return 0;
-    /* Its arm may have stopped it for a moment, or holds it. */
+    /* Rolling friction may have stopped it for a moment only, or it holds the disk. */
     int held = speed <= STOPPED * W.pace && fabs(c->pull) * d->radius <= c->arm * press_on(d, s, c->nx, c->ny);
     return d->inertia == 0 || c->pull == 0 || held;
 }
 
-/* End the track of a disk that came to rest on one surface, when its slip was used up: `d->since`.
+/* End the track of a disk that came to rest on one surface, at the time when its slip vanished: `d->since`.
 
-   From the velocity after the impulses to that in the middle of the step it is a hop, which is left
-   out: an impulse of its own. At that velocity it has gone since, and what gravity did then the
-   drive paid. */
+   From the velocity after the impulses to that in the middle of the step there is a hop, which is left out: it counts as
+   an impulse of its own. Since `d->since` the disk has moved at that velocity, and the drive has paid for the work of
+   gravity. */
 static void settle(int i, const Contact *last, double h) {
     Disk *d = W.disks + i;
     Contact hop = *last;
@@ -141,31 +143,31 @@ static void settle(int i, const Contact *last, double h) {
     finish(i, BY_SETTLING);
 }
 
-/* Write the separation of a disk that no surface presses any more. */
+/* Record the separation of a disk that no surface presses any more. */
 static void tell_separation(int i) {
     const Disk *d = W.disks + i;
     const Track *track = W.tracks + i;
-    /* In a crowd the loads may be of long ago: they are noted where it lies on one surface only. */
+    /* In a crowd the loads may be old: they are noted only while the disk lies on a single surface. */
     if (track->lasted < 3 || d->t - track->load_t[2] > 4 * W.dt) {
         event_here(SEPARATION, i, track->ground);
         return;
     }
     double t = time_unloaded(track->load + 1, track->load_t + 1);
     if (t > 2 * d->t - track->load_t[0]) {
-        /* It was not worn off, the face ended: the last impulse tells how long the load went on. */
+        /* The load did not fade, the face ended: the last impulse tells how long it acted. */
         double past = 0.5 * (track->load_t[0] - track->load_t[1]);
         double span = past + 0.5 * (d->t - track->load_t[0]);
         t = track->load_t[0] - past + track->load[0] / track->load[1] * span;
     }
     t = MIN(MAX(t, track->load_t[1]), d->t);
-    /* It has flown since. */
+    /* It has been in flight since then. */
     Disk then = *d;
     advance(&then, t);
     write_event(SEPARATION, i, -1, track->ground, t, &then.x, &then.vx, &then.vx, 0, 0);
 }
 
-/* Begin the rest of a disk anew if it moves: something at its contacts does, or it has none, and it has come
-   further from where its rest began than at the speed that counts as none. */
+/* Restart the rest of a disk if the disk moves: something moves at its contacts, or it has none, and it is further from
+   where its rest began than the greatest speed that counts as rest would take it. */
 static void settle_down(Disk *d, double h) {
     double most = REST * sqrt(W.g * d->radius) * CALM_DOWN / W.pace;
     double x = d->x - d->anchor[0], y = d->y - d->anchor[1], turn = d->anchor[2];
@@ -178,9 +180,9 @@ static void settle_down(Disk *d, double h) {
     d->anchor[2] = 0;
 }
 
-/* Have what touches a disk that a belt carries, with all that touches it in turn, rattle no longer than it helps: nothing
-   moves what is carried, so between two of these, or one and a belt, there may be no room. What the solve of all of them
-   leaves open, blows leave open, too: see `left_over`. */
+/* Set the approach at which disks in contact with a rider, directly or through others, may stay unresolved. The solver
+   does not move riders, so between two of them, or one and a belt, there may be no room, and impacts would go on without
+   end. Impacts may leave open as much as the solve of all of these contacts does: see `left_over`. */
 void give_in(const Contact *list, int count) {
     double open = 0, u[3], v[3];
     int carried = 0;
@@ -196,16 +198,16 @@ void give_in(const Contact *list, int count) {
     }
 }
 
-/* After the solve: entries, supports, timers, tracks. */
+/* After the solve: ledger entries, supports, timers, tracks. */
 void close_step(double h) {
-    /* The share of the impulses that belongs to the step before; of a new contact, none. */
+    /* The share of the impulses that belongs to the step before; 0 for a new contact. */
     W.before = W.length_before > 0 ? W.length_before / (W.length_before + h) : 0.5;
     if (!W.interact && !W.tracks[W.low].lasted) W.before = 0;
     for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         d->links = d->before = -1;
-        /* A disk by itself that leaves what it lay on may come back to it in this step, off by what a
-           step is: that is no blow, and of endless friction it would be one however soft. */
+        /* A disk by itself that leaves a surface may come back to it within this step, by the error of a step. That is no
+           impact, although infinite friction would make it one, however soft. */
         if (d->mode == FREE && (W.interact || !d->supports)) d->held_count = 0;
         d->supports = 0;
         if (W.length_before > 0.01 * W.step) d->impacts = 0;
@@ -213,7 +215,7 @@ void close_step(double h) {
         d->lacks = d->open = 0;
         if (d->mode == FREE) {
             d->calm += h;
-            /* What has joints does not fall asleep. */
+            /* A particle with joints does not fall asleep. */
             d->rest += is_tied(i) ? 0 : h;
             d->anchor[2] += h * d->radius * d->spin;
         }
@@ -269,7 +271,7 @@ void close_step(double h) {
             a->on = c->owner;
             a->slips = 1;
         }
-        /* Halfway through the impulses the hop is left out. */
+        /* In the mean of both velocities there is no hop. */
         double off = fabs(0.5 * (u[0] + v[0])), slip = fabs(v[1] + c->drift);
         double turn = fabs(v[2]) * a->radius, rest = REST * sqrt(W.g * a->radius);
         const Surface *s = W.surfaces + (b ? 0 : -1 - c->j);
@@ -281,7 +283,7 @@ void close_step(double h) {
         if (off > rest || slip > rest || turn > rest || (b && b->mode == RIDING)) {
             a->stirred = 1;
             if (b) b->stirred = 1;
-            /* What something drives is not at rest, even if it stays where it is. */
+            /* A driven disk is not at rest, even if it stays where it is. */
             if (b ? b->mode == RIDING : c->other[1] != 0 || stirs(s)) a->rest = 0;
         }
     }
@@ -310,7 +312,7 @@ void close_step(double h) {
         int owners = 0;
         for (int link = d->links; link >= 0; link = W.links[link]) {
             const Contact *c = W.contacts + link / 2;
-            /* What its hop reaches it lies on, too: that is no blow. */
+            /* It also lies on what its hop reaches: that is no impact. */
             if (!W.interact && c->impulse[0] == 0 && c->gap <= 0.125 * (W.g + W.haste) * h * h
                     && d->held_count < MAX_HELD) d->held[d->held_count++] = -1 - c->j;
             if (c->impulse[0] == 0 && c->clings == 0) continue;
@@ -324,12 +326,12 @@ void close_step(double h) {
             note_grip(d, only, u, v, h);
             if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && d->since <= d->t + h
                     && lies(d, only, h)) {
-                /* What rolled stops now, not when it began to. */
+                /* A disk that rolled stops now, not when its slip ended. */
                 if (only->arm > 0 && d->inertia > 0) d->since = MAX(d->since, d->t);
                 settle(i, only, h);
             }
         } else {
-            /* On several; of a surface it lies on, if any, it may still part. */
+            /* It lies on several; it may still separate from the surface among them, if there is one. */
             int ground = -1;
             for (int link = d->links; link >= 0; link = W.links[link]) {
                 const Contact *c = W.contacts + link / 2;
@@ -346,7 +348,7 @@ void close_step(double h) {
         if (d->mode == GONE) continue;
         track_lasting(i);
         for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
-        /* Held in a corner by what is at rest. */
+        /* Held in a corner by surfaces at rest. */
         if (owners > 1 && !W.interact && W.until == UNTIL_SETTLED && track->lasted > 3 && !W.stirs) {
             const double *s = track->held + 3, *p = track->past + 3;
             double most = MAX(fabs(s[0]) + fabs(s[1]), fabs(p[0]) + fabs(p[1]));
@@ -358,14 +360,14 @@ void close_step(double h) {
         if (W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
         d->ends = reason;
     }
-    /* All are asked for what they are ahead before the state of any changes. */
+    /* First take back what all of these are ahead, then change their states: impulses depend on both partners. */
     for (EACH_LIVE(i))
         if (W.disks[i].mode == FREE && W.disks[i].ends >= 0) take_back(i);
     for (EACH_LIVE(i))
         if (W.disks[i].mode == FREE && W.disks[i].ends >= 0) end_in_contact(i, W.disks[i].ends);
 }
 
-/* Take back what the second half of this step's impulses did to the ledger by disk i. */
+/* Take back what the second half of this step's impulses did to the ledger for disk i. */
 void take_back(int i) {
     Disk *d = W.disks + i;
     double given = W.pushes ? pushed(d, W.before) : 0;
@@ -390,13 +392,13 @@ void take_back(int i) {
     }
 }
 
-/* End the track of a disk in lasting contact in the state halfway through this step's impulses. */
+/* End the track of a disk in lasting contact, in the state halfway through this step's impulses. */
 void end_in_contact(int i, int reason) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
     const double *s = track->held;
     if (d->held_count)
-        /* In a hollow it is faster than its impulses make it, see `track_lasting`. */
+        /* Inside an arc it is faster than its impulses make it, see `track_lasting`. */
         bear_disk(d, W.surfaces[d->held[0]].owner, d->mass * (s[3] - d->ux - W.before * (d->vx - d->ux)),
                   d->mass * (s[4] - d->uy - W.before * (d->vy - d->uy)), d->t, d->t);
     d->x = s[1];

@@ -1,16 +1,17 @@
-/* One contact: its frame, what it feels of its partners, impulses, and their work. */
+/* One contact: its normal, its effective masses, its impulses, and the work of these. */
 
 #include "core.h"
 
-/* Of what a hollow turns a disk by in a step: so much more is still its doing, not a blow's. */
+/* How many times the turn of a path that an arc gives in a step still counts as due to the arc; a larger one is due to an
+   impact. */
 #define CHORD 1.01
-/* Sine of half the angle that a step may turn a disk in a hollow by, at most. */
+/* Sine of half the greatest angle by which a step may turn a disk inside an arc. */
 #define STEEPEST 0.9
-/* rad; what comes off the inside of an arc by less, however short steps are, stays on it: bounces that go on without an
-   end are left out at last. */
+/* rad; a particle that hits the inside of an arc at a smaller angle stays on it, however short steps are: otherwise its
+   bounces, which have no end, would all be resolved. */
 #define FLAT 0.01
 
-/* Whether a disk touches the same place of two surfaces: pieces on each other, or the point that they share. */
+/* Whether a disk touches two surfaces at the same place: where one lies on the other, or at an end that both share. */
 static int same_place(const Disk *d, int k, int other) {
     double nx, ny, mx, my;
     double gap = gap_to(surface_at(k, d->t), d->x, d->y, d->radius, &nx, &ny);
@@ -18,7 +19,8 @@ static int same_place(const Disk *d, int k, int other) {
     return fabs(off) <= TOUCHING * d->radius && fabs(nx - mx) + fabs(ny - my) <= TOUCHING;
 }
 
-/* The surface that acts where a disk touches k: of those in the same place the first in the file. */
+/* The surface whose coefficients count where a disk touches surface k: of all surfaces at that place the first one of the
+   file. */
 static int acting(int i, int k) {
     const Disk *d = W.disks + i;
     const int *list;
@@ -31,7 +33,7 @@ static int acting(int i, int k) {
     return first < W.surface_count ? first : k;
 }
 
-/* Fill in a contact of disk i as both partners are now; impulses are left alone. */
+/* Fill in a contact of disk i with j from their present states. Impulses are not changed. */
 void describe(Contact *c, int i, int j) {
     const Disk *a = W.disks + i;
     const Pair *pair;
@@ -96,7 +98,7 @@ void describe(Contact *c, int i, int j) {
     c->arm = pair->rolling * reach;
 }
 
-/* Relative velocities at a contact, now or before the step's impulses: normal, slip, spin. */
+/* Relative velocities at a contact: normal, slip, spin; now, or before the impulses of the step (`earlier`). */
 void relative(const Contact *c, int earlier, double *out) {
     const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     const double *v = earlier ? &a->ux : &a->vx;
@@ -114,14 +116,14 @@ void relative(const Contact *c, int earlier, double *out) {
     if (c->hung) swing_away(c, earlier, out);
 }
 
-/* The root of the island of a disk, in `W.queue`. */
+/* The root of the island of a disk; `W.queue` holds the parents of a union-find forest. */
 int island_of(int i) {
     int *parent = W.queue;
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
     return i;
 }
 
-/* Give an impulse to disk i, and the opposite one to a free partner. */
+/* Apply an impulse to disk i, and the opposite one to its partner if that can move. */
 void push(const Contact *c, const double *J) {
     Disk *a = W.disks + c->i;
     double x = J[0] * c->nx + J[1] * c->ny, y = J[0] * c->ny - J[1] * c->nx;
@@ -137,10 +139,9 @@ void push(const Contact *c, const double *J) {
     if (c->hung) push_hinge(c, J);
 }
 
-/* Ledger entries of a contact's impulses, which changed its relative velocities from u to v: an
-   impulse J does the work J (u + v) / 2. Of what is left when the share f of it has been given, it
-   is (1 - f) J (u (1 - f) + v (1 + f)) / 2. `given` is the work of the belt that carries the
-   partner, if that is a rider. */
+/* Ledger entries, J, of a contact's impulses, which changed its relative velocities from u to v: an impulse J does the
+   work J (u + v) / 2. After the share f of the impulse has been given, the rest of it does (1 - f) J (u (1 - f) + v (1 +
+   f)) / 2. `given` is the work of the belt that carries the partner, if that is a rider. */
 void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given) {
     const double J[3] = {pressed(c), c->impulse[1], c->impulse[2]};
@@ -153,10 +154,10 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
     if (c->hung) entries[0] += swung(c, f);
 }
 
-/* Share what is lost in contacts that were solved together: of a crowd only the sum is known. In a chain
-   wedged between walls impulses of any size hold each other; where one of its gaps opens and another
-   closes, one seems to give what the other takes. So where the sum is a loss those that gain
-   gain nothing and the others lose so much less; where it is a gain, the other way round. */
+/* Pool the losses of contacts that were solved together: only their sum has a meaning. In a chain that is wedged between
+   walls, impulses of any size can balance each other; if one gap opens while another closes, one contact seems to gain
+   what the other loses. So if the sum is a loss, gains become 0 and all losses are scaled down to keep the sum; if it is
+   a gain, losses become 0. */
 void pool(Contact *list, int count, int later) {
     double sums[2] = {0, 0};
     for (int n = 0; n < count; n++) {
@@ -174,7 +175,7 @@ void pool(Contact *list, int count, int later) {
     }
 }
 
-/* Mass of the disks of contacts that were solved together. */
+/* Mass of the disks of contacts that were solved together, kg. */
 static double mass_of(const Contact *list, int count) {
     double mass = 0;
     W.stamp++;
@@ -187,9 +188,9 @@ static double mass_of(const Contact *list, int count) {
     return mass;
 }
 
-/* Kinetic energy of which a disk of a crowd in a hollow, and the `mass` that it carries along, are short halfway
-   through this step's impulses, J: velocities turn, so that the mean of those before and after is smaller than
-   they are. What gravity changes is a hop, whose velocity is zero halfway. */
+/* Kinetic energy by which the recorded state halfway through the impulses of a step is too low, J, for a disk inside an
+   arc and the `mass` that it pushes along. The arc turns its velocity, so the mean of the velocities before and after is
+   smaller than either. The part that gravity changes is a hop, whose normal velocity is zero halfway: it doesn't count. */
 static double lacks(const Contact *c, double mass, const double *u, const double *v) {
     const Disk *d = W.disks + c->i;
     double f = W.before, x = d->ux + f * (d->vx - d->ux), y = d->uy + f * (d->vy - d->uy);
@@ -199,7 +200,7 @@ static double lacks(const Contact *c, double mass, const double *u, const double
     return 0.5 * f * (1 - f) * MIN(c->impulse[0], mass * change) * turns;
 }
 
-/* Work out the ledger entries of contacts that were solved together. */
+/* Set the ledger entries of contacts that were solved together. */
 void account(Contact *list, int count) {
     double mass = 0;
     for (int n = 0; n < count; n++) {
@@ -222,7 +223,7 @@ void account(Contact *list, int count) {
     pool(list, count, 1);
 }
 
-/* Hardly ever asked to the end. */
+/* Not inlined: callers rarely get here. */
 RARELY int is_one(const Disk *d, int k, int other) {
     return other >= 0 && (goes_on(-1 - k, -1 - other) || same_place(d, k, other));
 }
@@ -233,8 +234,8 @@ int is_held(const Disk *d, int k) {
     return 0;
 }
 
-/* By how much more than gravity the way inside an arc presses a disk on a surface, m/s2: that arc, or
-   the one before or after a joint that the disk passes. */
+/* By how much the path inside an arc presses a disk on a surface in addition to gravity, m/s2. The arc is that surface
+   itself, or the piece before or after a joint that the disk passes. */
 double pressed_inside(const Disk *d, int surface) {
     double most = 0;
     for (int n = 0; n < 2 * d->held_count; n++) {
@@ -249,7 +250,7 @@ double pressed_inside(const Disk *d, int surface) {
     return most;
 }
 
-/* Time in which a disk that slides inside an arc is turned by FLAT, INFINITY on what is not hollow. */
+/* Time in which a disk that slides inside an arc turns by FLAT, s; INFINITY on any other surface. */
 double turning_time(const Disk *d, const Surface *s) {
     double v[2];
     along_with(s, d, v);
@@ -257,7 +258,7 @@ double turning_time(const Disk *d, const Surface *s) {
     return bends > 0 ? FLAT / bends : INFINITY;
 }
 
-/* How hard gravity, the curved way and the surface's motion press a disk on it, m/s2. */
+/* Acceleration with which gravity, the curvature of the path and the motion of the surface press a disk on it, m/s2. */
 double press_on(const Disk *d, const Surface *s, double nx, double ny) {
     double v[3], pull, up = pulled(s, d, nx, ny, &pull);
     carried(s, d->x, d->y, v);
@@ -265,9 +266,8 @@ double press_on(const Disk *d, const Surface *s, double nx, double ny) {
     return up - (W.gx * nx + W.gy * ny) - along * along * bending(s, d->x, d->y, d->radius);
 }
 
-/* Sine of the angle to the surface of the chord on which a disk goes on in a hollow for a time h, to where
-   its gap is 0, or of its overlap so much (m) is parted; past an end of a hollow that it comes to or from, by
-   Newton's steps. */
+/* Sine of the angle between the surface and the chord on which a disk inside an arc moves for a time h, such that its gap
+   is 0 at the end, or its overlap less by `parted` (m). If it passes an end of the arc, Newton steps find the angle. */
 double chord(const Contact *c, double parted, double h) {
     const Disk *d = W.disks + c->i;
     const Surface *s = surface_at(-1 - c->j, d->t);
@@ -293,14 +293,14 @@ double chord(const Contact *c, double parted, double h) {
     return out;
 }
 
-/* Turn the normal of a contact in a crowd to where a hollow leads the disk; return the cosine of that turn.
+/* Turn the normal of a contact in a crowd as the path inside an arc requires; return the cosine of that turn.
 
-   There a path is a row of chords, and an impulse stands for half of the step before (`past`; 0 if it
-   did not last) and half of this one: its normal is that of their middle. Then it turns the velocity and
-   does no work. Along the normal where it begins, chords would be faster than the arc by
-   1/2 (v^2 h / 2 (R - r))^2, which the first makes and nothing takes back when a blow ends the row.
-   Gravity bends a chord to a parabola: that part is a hop as everywhere. `in` and `out` are the sines of
-   the angles of both chords to the surface. */
+   There the path is a sequence of chords. An impulse acts for half of the step before (of length `past`; 0 for a new
+   contact) and half of this one, so its normal is that in the middle between the two chords: then it turns the velocity
+   and does no work. With the normal at the point of contact the disk would be faster on chords than on the arc, by 1/2
+   (v^2 h / 2 (R - r))^2 of its speed; the first chord causes that, and if an impact ends the sequence, nothing takes it
+   back. Gravity bends each chord to a parabola; that part is a hop, as everywhere. `in` and `out` are the sines of the
+   angles of both chords to the surface. */
 double follow(Contact *c, double past, double out) {
     const Disk *d = W.disks + c->i;
     const Surface *s = surface_at(-1 - c->j, d->t);

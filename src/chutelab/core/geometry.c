@@ -1,18 +1,18 @@
-/* Where surfaces are, how fast they run, and when a disk on a parabola meets one. */
+/* Gaps between disks and surfaces, speeds of surfaces, and when a disk on a parabola meets a surface or another disk. */
 
 #include "core.h"
 
-/* Newton's steps to where a parabola is nearest: from that of its chord, which is close. */
+/* Newton steps to the point of a parabola that is nearest to a centre; they start from that of its chord, which is close. */
 #define NEAREST 4
 
-/* Whether a point, seen from the centre, is in the angle of an arc, which may be wider than a half
-   circle; all of a circle. */
+/* Whether a point is within the angle of an arc, seen from its centre at (dx, dy); always true for a circle. The arc may
+   be wider than a half circle. */
 static int in_angle(const Surface *s, double dx, double dy) {
     if (s->shape == CIRCLE) return 1;
     return dx * s->tx + dy * s->ty >= s->cos_half * sqrt(dx * dx + dy * dy);
 }
 
-/* How far along a piece the foot of a point is: -1 before the first end, 1 beyond the second, else 0. */
+/* Where the foot of a point lies along a piece: -1 before its first end, 1 beyond its second end, else 0. */
 static int beyond(const Surface *s, double dx, double dy) {
     if (s->shape == SEGMENT) {
         double along = dx * s->tx + dy * s->ty;
@@ -21,17 +21,17 @@ static int beyond(const Surface *s, double dx, double dy) {
     return in_angle(s, dx, dy) ? 0 : s->tx * dy - s->ty * dx < 0 ? -1 : 1;
 }
 
-/* Whether a piece that is tangent to a circle hides it from a disk at (x, y): that is before the piece,
-   and all of the circle behind it. */
+/* Whether a segment that is tangent to a circle hides the circle from a disk at (x, y): the disk is beside the segment,
+   and the centre of the circle is on the other side of it. */
 static int hides(const Surface *s, const Surface *circle, double x, double y) {
     if (s->shape != SEGMENT || !s->there || beyond(s, x - s->x, y - s->y)) return 0;
     double off = (y - s->y) * s->tx - (x - s->x) * s->ty;
     return off * ((circle->y - s->y) * s->tx - (circle->x - s->x) * s->ty) < 0;
 }
 
-/* The piece whose face a disk at (x, y) is on: beyond a smooth end of `s` the one that goes on there,
-   and of a circle the one that hides it. So the end between two such pieces is not felt, even by a
-   disk that has sunk in a little. */
+/* The piece whose face a disk at (x, y) is on: beyond a smooth end of `s` the piece that continues there; for a circle
+   the tangent segment that hides it. So a disk doesn't feel the joint of two such pieces, even if it overlaps them a
+   little. */
 const Surface *face_at(const Surface *s, double x, double y) {
     if (mate_of(s, 0) < 0 && mate_of(s, 1) < 0) return s;
     if (s->shape == CIRCLE) {
@@ -45,7 +45,7 @@ const Surface *face_at(const Surface *s, double x, double y) {
     return mate >= 0 && next->there && !beyond(next, x - next->x, y - next->y) ? next : s;
 }
 
-/* Distance of a point from the nearer end, and the unit vector from there. */
+/* Distance of a point from the nearer end of a piece, m, and the unit vector from that end to the point. */
 static double from_end(const Surface *s, double x, double y, double *nx, double *ny) {
     double ax = x - s->end[0], ay = y - s->end[1], bx = x - s->end[2], by = y - s->end[3];
     double a = ax * ax + ay * ay, b = bx * bx + by * by, d = sqrt(MIN(a, b));
@@ -55,7 +55,7 @@ static double from_end(const Surface *s, double x, double y, double *nx, double 
     return d;
 }
 
-/* Gap between a disk and a surface, and the unit normal from the surface to the disk. */
+/* Gap between a disk and a surface, m, and the unit normal from the surface to the disk. */
 double gap_to(const Surface *s, double x, double y, double r, double *nx, double *ny) {
     double dx = x - s->x, dy = y - s->y;
     if (s->shape == SEGMENT) {
@@ -75,7 +75,8 @@ double gap_to(const Surface *s, double x, double y, double r, double *nx, double
     return from_end(s, x, y, nx, ny) - r;
 }
 
-/* How far a point is on the left of a piece, or outside, m; beyond an end, of its straight way on from there. */
+/* Distance of a point from a piece, m, positive on its left (on the outside of an arc). Beyond an end of an arc, of the
+   tangent there. */
 static double beside(const Surface *s, double x, double y) {
     double dx = x - s->x, dy = y - s->y, nx, ny;
     if (s->shape == SEGMENT) return dy * s->tx - dx * s->ty;
@@ -85,8 +86,9 @@ static double beside(const Surface *s, double x, double y) {
     return (off * (nx * dx + ny * dy) - off * off) / s->radius;
 }
 
-/* Gap at t between a disk at a place and the nearest piece of a chain, and on which side of it its centre is: its solid one if above
-   0, of what is solid on both 0. At a corner, where two pieces are as near, that is told by the sum of their normals. */
+/* Gap at time t between a disk at (x, y) and the nearest piece of a chain, m. `side` tells on which side of that piece
+   the centre is: above 0 on the solid one, 0 if both are solid. At a corner, where two pieces are equally near, the sum
+   over both decides. */
 double chain_gap(const Surface *s, const Disk *d, double x, double y, double t, double *side) {
     int first = (int)(s - W.surfaces), k = first;
     double least = INFINITY, clear = INFINITY, nx, ny;
@@ -101,8 +103,8 @@ double chain_gap(const Surface *s, const Disk *d, double x, double y, double t, 
     return has_corners(d) ? clear : least;
 }
 
-/* Time from d->t until a disk that what is solid from one side lets through is clear of it on that side, INFINITY if not
-   within the span: looked at in strides in which it can come to none of it. */
+/* Time from d->t until a disk that passes a one-sided surface is clear of it on the solid side, INFINITY if not within
+   the span. The search advances by steps in which the disk cannot reach the surface. */
 double clear_after(const Surface *s, const Disk *d, double span) {
     double most = sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * span + W.fastest, side;
     if (has_corners(d)) most += fabs(d->spin) * d->radius;
@@ -117,9 +119,9 @@ double clear_after(const Surface *s, const Disk *d, double span) {
 
 /* Speed of the surface along (ny, -nx) at a contact with normal n of a disk at (x, y), m/s.
 
-   One rule for faces, ends and circles: the surface runs along its left side (a circle: its
-   outside) as `speed` says, and against it on the other side. On both faces of a segment that is
-   its velocity; round an end it is that of an end roller, see `find_crown`. */
+   One rule holds for faces, ends and circles: on its left (a circle: outside) the surface runs at `speed`, on the other
+   side at -`speed`. On both faces of a segment that is the velocity of the belt; round an end it is that of an end
+   roller, see `find_crown`. */
 double surface_speed(const Surface *s, double nx, double ny, double x, double y, double r) {
     double side, dx = x - s->x, dy = y - s->y;
     int end = s->shape == CIRCLE ? 0 : beyond(s, dx, dy);
@@ -130,7 +132,7 @@ double surface_speed(const Surface *s, double nx, double ny, double x, double y,
     return side >= 0 ? s->speed : -s->speed;
 }
 
-/* Curvature (1/m) of the way of the centre of a disk that stays in contact; > 0: round an outside. */
+/* Curvature of the path of a disk's centre while the disk stays in contact, 1/m; positive round an outside. */
 double bending(const Surface *s, double x, double y, double r) {
     double dx = x - s->x, dy = y - s->y;
     if (s->shape == SEGMENT) {
@@ -143,14 +145,14 @@ double bending(const Surface *s, double x, double y, double r) {
     return inside > 0 ? -1 / inside : 0;
 }
 
-/* When a point that moves on a parabola about a centre comes within `reach` of it, or from within
-   beyond it (side = -1); its speed of approach then. INFINITY if not within the span, and if it is
-   there and does not approach.
+/* When a point that moves on a parabola comes within `reach` of the centre at the origin (side = 1), or from within to
+   `reach` away from it (side = -1), and its speed of approach then. INFINITY if not within the span, or if it is there
+   already and does not approach.
 
-   The chord of the parabola gives a bracket and a first guess, Newton's method the root. Where both
-   ends of the chord are outside, the parabola bends from it by g h^2/8 at most: it is asked where it is
-   nearest. A hop that touches the inside of a circle from below between two places that do not is
-   missed: it is no faster than gravity makes it in half the span. */
+   The chord of the parabola gives a bracket and a first guess, Newton's method the root. If both ends of the chord are
+   outside, the parabola can still come within reach between them, as it is off the chord by at most g h^2/8: then its
+   nearest point is checked. From inside this is not checked, so a hop that touches the circle only between two places
+   that are clear of it is missed; its speed of approach is at most what gravity gives in half the span. */
 static double meet_round(double x, double y, double vx, double vy, double reach, double side,
                          double span, double *approach) {
     double c = side * (x * x + y * y - reach * reach);
@@ -182,7 +184,7 @@ static double meet_round(double x, double y, double vx, double vy, double reach,
         }
     }
     if (root < 0) root = 0;
-    /* The form without cancellation of either root. */
+    /* Of both forms of the root, the one without cancellation. */
     if (side > 0) h = c / (-b + sqrt(root));
     else h = b > 0 ? c / (b + sqrt(root)) : (-b + sqrt(root)) / a;
     if (!(h >= low && h <= high)) h = high;
@@ -201,7 +203,7 @@ static double meet_round(double x, double y, double vx, double vy, double reach,
     return h;
 }
 
-/* The same for a plane: its gap, the gap's rate and its acceleration. */
+/* The same for a plane, from the gap, its rate and its acceleration. */
 static double meet_face(double gap, double rate, double pull, double span, double *approach) {
     *approach = 0;
     if (gap <= 0 && rate <= 0) {
@@ -212,14 +214,15 @@ static double meet_face(double gap, double rate, double pull, double span, doubl
     double root = rate * rate - 2 * pull * MAX(gap, 0);
     if (root < 0) return INFINITY;
     root = sqrt(root);
-    /* The form without cancellation: going away it comes back, else it comes. */
+    /* The form without cancellation: it returns after moving away, or it approaches at once. */
     double h = rate > 0 ? (rate + root) / -pull : 2 * gap / (root - rate);
     if (!(h <= span)) return INFINITY;
     *approach = root;
     return h;
 }
 
-/* An end is met where the foot of the disk is beyond it; before, the face is in the way. */
+/* When a disk meets an end of a piece. This counts only if the foot of the disk is beyond the end; before it, the face is
+   in the way. */
 static double meet_ends(const Surface *s, const Disk *d, double span, double *approach) {
     double first = INFINITY;
     for (int e = 0; e < 4; e += 2) {
@@ -239,10 +242,9 @@ static double meet_ends(const Surface *s, const Disk *d, double span, double *ap
     return first;
 }
 
-/* When a disk meets a circle from inside. Where it goes inwards at first, from outside through the
-   opening of an arc or from a place that touches, that is after it was nearest to the centre; if it is
-   not inside even there, never. What has sunk in so that it overlaps even there meets it where it is as
-   deep again. */
+/* When a disk meets a circle from inside. If it first moves inwards (it enters through the opening of an arc, or leaves a
+   place where it touches), only the path after its point nearest to the centre counts; if it is not inside even there, it
+   never meets it. A disk that overlaps the circle even at that point meets it where it is as deep again as at the start. */
 static double meet_inside(const Surface *s, const Disk *d, double span, double *approach) {
     double x = d->x - s->x, y = d->y - s->y, vx = d->vx, vy = d->vy, t = 0, reach = s->radius - d->radius;
     double in = x * vx + y * vy, away = x * x + y * y;
@@ -282,8 +284,7 @@ double meet_surface(const Surface *s, const Disk *d, double span, double *approa
     }
     double away = sqrt(dx * dx + dy * dy), side = away >= s->radius ? 1 : -1;
     if (side * (away - s->radius) > sweep + r) return INFINITY;
-    /* The first of its outside, its inside and its ends: a disk that comes in at an opening may meet an
-       end first. */
+    /* The first of outside, inside and ends: a disk that enters through an opening may meet an end first. */
     double first = INFINITY, speed;
     for (; side >= -1; side -= 2) {
         double h = INFINITY;
@@ -304,8 +305,8 @@ double meet_surface(const Surface *s, const Disk *d, double span, double *approa
     return h;
 }
 
-/* Time until two disks at a relative place (x, y) and velocity (u, v) are `reach` apart: as both
-   fall alike the way is straight. */
+/* Time until two disks at a relative place (x, y) with a relative velocity (u, v) are `reach` apart. Both fall with the
+   same acceleration, so their relative path is straight. */
 double meet_disk(double x, double y, double u, double v, double reach, double span,
                  double *approach) {
     double b = x * u + y * v, c = x * x + y * y - reach * reach;
@@ -324,8 +325,8 @@ double meet_disk(double x, double y, double u, double v, double reach, double sp
     return h;
 }
 
-/* How long a disk that flies alone needs no step, s, `least` at least: until it could reach
-   something round, or has crossed the line of a segment. */
+/* Time for which a disk that flies alone needs no step, s, but not less than `least`: until it could reach an arc or an
+   end, or crosses the line of a segment. */
 double free_span(const Disk *d, double least) {
     double span = INFINITY, v = sqrt(d->vx * d->vx + d->vy * d->vy), r = d->radius;
     for (int k = 0; k < W.surface_count && span > least; k++) {

@@ -1,14 +1,17 @@
-/* Which disks may meet in a step: a hash grid of the boxes that the disks can reach. */
+/* Which disks may meet in a step: a hash grid of the boxes that the disks can reach. It also lists the surfaces near a
+   disk. */
 
 #include <string.h>
 #include "core.h"
 
-/* Most cells that one box is entered in. A larger box (a fast disk among slow ones) is asked by all:
-   the `W.wide_count` last entries of `W.found`, which has two for each disk. */
+/* Greatest number of cells that one box is entered in. A disk with a larger box (a fast one among slow ones) is compared
+   with all others instead: such disks are the `W.wide_count` last entries of `W.found`, which has room for two entries
+   per disk. */
 #define MOST_CELLS 256
-/* Radii by which boxes are larger than they have to be: a blow may lead a disk so far from its way without another look. */
+/* Margin of the boxes, in radii: a blow may lead a disk so far off its path before its neighbours have to be looked up
+   again. */
 #define SKIN 0.05
-/* Radii round the box of a disk for which the surfaces near it are listed. */
+/* Margin, in radii, round the box of a disk within which its nearby surfaces are listed. */
 #define ROOM 1.0
 
 static int bucket(int ix, int iy) {
@@ -19,7 +22,7 @@ static int bucket(int ix, int iy) {
 static void box_of(const Disk *d, double end, double room, double *box) {
     double h = end - d->t, x = d->x + (d->vx + 0.5 * W.gx * h) * h;
     double y = d->y + (d->vy + 0.5 * W.gy * h) * h;
-    /* Half of TOUCH for each of two disks, what the contact solver may change, and the sagitta. */
+    /* Half of TOUCH for each of two disks, what the contact solver may change, and the sagitta of the parabola. */
     double margin = d->radius * (1 + TOUCH + room) + W.soft * h + 0.125 * W.g * h * h;
     box[0] = MIN(d->x, x) - margin;
     box[1] = MIN(d->y, y) - margin;
@@ -32,7 +35,7 @@ static int cell_at(double x) {
     return n < -1e9 ? -1000000000 : n > 1e9 ? 1000000000 : (int)n;
 }
 
-/* The first and last columns and rows of a box, and how many cells it has. */
+/* The first and last columns and rows of a box, and its number of cells. */
 typedef struct { int x0, x1, y0, y1; double cells; } Span;
 
 static Span span_of(const double *box) {
@@ -57,7 +60,7 @@ static void enter(int i, Span s) {
         }
 }
 
-/* Whether two disks meet at all. */
+/* Whether two disks can collide: their kinds may pass through each other, and joined ones may be exempt. */
 static int meet(int i, int j) {
     if (!W.passes) return 1;
     return pair_of(W.disks[i].kind, W.disks[j].kind)->restitution >= 0 && !are_joined(i, j);
@@ -67,7 +70,7 @@ static int overlaps(const Disk *a, const double *box) {
     return a->left < box[2] && a->right > box[0] && a->bottom < box[3] && a->top > box[1];
 }
 
-/* Put the disks whose boxes overlap a box, which spans these cells, into `W.found`; return how many. */
+/* Write the disks whose boxes overlap a box, which covers the cells `s`, to `W.found`; return how many. */
 static int query(int i, const double *box, Span s) {
     int n = 0, stamp = ++W.stamp;
     W.disks[i].mark = stamp;
@@ -94,7 +97,7 @@ static int query(int i, const double *box, Span s) {
     return n;
 }
 
-/* Put a pair behind those that may meet. */
+/* Write a pair to place n of `W.near` and link it to both disks. */
 static void add_near(int n, int i, int j) {
     for (int k = 2 * n; k < 2 * n + 2; k++) {
         Disk *d = W.disks + (W.near[k] = k % 2 ? j : i);
@@ -103,7 +106,7 @@ static void add_near(int n, int i, int j) {
     }
 }
 
-/* List all pairs that may meet before `end`; 0 if they are more than there is room for. */
+/* List all pairs that may meet before `end`; return 0 if there is no room for them. */
 int list_near(double end) {
     double extent = 0;
     int live = 0;
@@ -117,10 +120,10 @@ int list_near(double end) {
         live++;
     }
     if (!W.interact) return 1;
-    /* With cells of 1.5 boxes most boxes touch two to four of them. */
+    /* With cells of 1.5 times the mean box, most boxes overlap two to four cells. */
     W.cell = live ? 1.5 * extent / live : 1;
     memset(W.heads, 0xff, (unsigned long)W.bucket_count * sizeof(int));
-    /* What follows a prescribed path meets free disks only: it is entered first, and asks for no others. */
+    /* Riders and sleepers can meet free disks only: they are entered first and query no others. */
     for (EACH_LIVE(i))
         if (W.disks[i].mode != FREE) enter(i, span_of(&W.disks[i].left));
     for (EACH_LIVE(i)) {
@@ -138,7 +141,7 @@ int list_near(double end) {
     return 1;
 }
 
-/* Add the pairs that a disk may meet in, and that are not listed: its path has changed within the step. */
+/* Add the pairs that a disk may meet in and that are not listed yet, after its path has changed within the step. */
 void list_again(int i) {
     const Disk *d = W.disks + i;
     int n = W.interact && W.later_count >= 0 ? query(i, &d->left, span_of(&d->left)) : 0;
@@ -154,7 +157,7 @@ void list_again(int i) {
     }
 }
 
-/* Enter a disk once more whose path changed within the step; 1 if it reaches further now. */
+/* Update the box of a disk whose path has changed within the step; return 1 if it reaches further now. */
 int enter_again(int i, double end) {
     Disk *d = W.disks + i;
     double box[4];
@@ -170,7 +173,7 @@ int enter_again(int i, double end) {
     return 1;
 }
 
-/* Put the disks that disk i may meet in what is left of the step into `W.found`. */
+/* Write the disks that disk i may meet in the rest of the step to `W.found`; return how many. */
 int reachable(int i) {
     int n = W.interact ? query(i, &W.disks[i].left, span_of(&W.disks[i].left)) : 0, kept = 0;
     for (int k = 0; k < n; k++)
@@ -178,8 +181,8 @@ int reachable(int i) {
     return kept;
 }
 
-/* List the surfaces that a disk may reach in this step, and maybe some more, ascending. They are looked
-   for again when it leaves its zone only: of a hundred pegs a disk is near three. */
+/* List the surfaces that a disk may reach in this step, perhaps some more, in ascending order. The list is made anew only
+   if the disk leaves its zone; among a hundred pegs a disk is near three. */
 int surfaces_near(int i, const int **list) {
     Disk *d = W.disks + i;
     double *zone = d->zone;
@@ -204,7 +207,7 @@ int surfaces_near(int i, const int **list) {
     return d->nearby_count;
 }
 
-/* Whether a disk released at (x, y) would overlap no other, and no gate that is shut. */
+/* Whether a disk released at (x, y) would overlap no other disk, no closed gate and no moving surface. */
 int place_is_free(int i, double x, double y, double t) {
     double r = W.disks[i].radius, box[4] = {x - r, y - r, x + r, y + r}, nx, ny;
     for (int k = 0; k < W.surface_count && (W.gate_count || W.mover_count); k++) {

@@ -1,12 +1,13 @@
-/* What is done by hand between two steps: disks are pushed, plates are turned.
+/* What a user does by hand between two steps: push disks and turn plates.
 
-   A push is a force. Once a step it gives an impulse for half of the step before and half of this one, beside
-   those of the contacts: so it is of second order, and its work is that impulse times the mean of the velocities
-   before and after all of them. A plate turns at an even rate up to a time, at which a step ends. */
+   A push is a force. Once a step it gives an impulse for half of the step before and half of this one, together with the
+   impulses of the contacts: so it is of second order, and its work is that impulse times the mean of the velocities
+   before and after all impulses. A plate turns at a constant rate until a given time, at which a step ends. */
 
 #include "core.h"
 
-/* Push a disk by a force until it is pushed anew. What sleeps wakes; what the incoming belt carries is not moved. */
+/* Apply a force (N) to a disk until the next call. A sleeping disk wakes; a disk that the incoming belt carries by
+   adhesion is not moved. */
 EXPORT void push_disk(int i, double x, double y) {
     Disk *d = W.disks + i;
     W.pushes |= x != 0 || y != 0;
@@ -15,7 +16,7 @@ EXPORT void push_disk(int i, double x, double y) {
     d->force[1] = y;
 }
 
-/* Give disks what pushes change of their velocities in a step of a length h. */
+/* Apply the impulses of pushes to disks, for a step of length h. */
 void kick_disks(double h) {
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
@@ -28,14 +29,14 @@ void kick_disks(double h) {
     }
 }
 
-/* Work of the push of a step on a disk, of which the share f has been given, J. */
+/* Work of the push of a step on a disk after the share f of its impulse has been given, J. */
 double pushed(const Disk *d, double f) {
     double before = d->kick[0] * d->ux + d->kick[1] * d->uy, after = d->kick[0] * d->vx + d->kick[1] * d->vy;
     return 0.5 * d->mass * ((1 - f) * (1 - f) * before + (1 - f * f) * after);
 }
 
-/* Turn a plate, which does not move by itself, to an angle from where it is written, at an even rate up to a
-   time after now; 0 if there is no memory. */
+/* Turn a plate that has no motion of its own to an angle relative to its written position, at a constant rate until a
+   later time. Return 0 if there is no memory. */
 EXPORT int steer(int owner, double x, double y, double angle, double until) {
     Mover *m = W.movers;
     while (m < W.movers + W.mover_count && m->surface != owner) m++;

@@ -1,18 +1,19 @@
-/* Hinges among the rows of the solver: a body that only turns, and rows of its stops and its motor. */
+/* Hinges among the rows of the solver: a hinge is a body that only rotates, its two stops and its motor are rows. */
 
 #include "core.h"
 
-/* rad/s; what a hinge is free to turn by that asks for nothing: finite, so that it can be multiplied by 0. */
+/* rad/s; change of rate that a hinge is allowed that asks for nothing. Finite, since infinity cannot be multiplied by 0. */
 #define ANY 1e100
 
-/* The body of a mover: its rim is the change of a hinge's rate, rad/s; others give no way. */
+/* The solver body of a mover: `rim` is the change of a hinge's angular velocity, rad/s. Other movers have no mobility. */
 SolverBody hinge_body(int k) {
     double turn = W.movers[k].inertia > 0 ? 1 / W.movers[k].inertia : 0;
     return (SolverBody){.turn = turn, .twist = turn, .bend = 1, .disk = -1};
 }
 
-/* Make rows of stops and motors, whose bodies begin with that; return how many. A stop gives an impulse that it asks for
-   as a contact does, a motor one as friction does: its normal impulse, which nothing changes, is the most that it gives. */
+/* Make the rows of stops and motors; `body` is the body of the first mover. Return how many rows. A stop acts like the
+   normal direction of a contact. A motor acts like friction: its normal impulse is the greatest angular impulse that it
+   can give, and no sweep changes it. */
 int set_hinge_rows(SolverRow *rows, int body) {
     SolverRow *r = rows;
     for (int k = 0; k < W.mover_count; k++) {
@@ -33,7 +34,7 @@ int set_hinge_rows(SolverRow *rows, int body) {
     return (int)(r - rows);
 }
 
-/* Give hinges what these rows, and all others, make of their rates. */
+/* Copy the impulses of these rows to the hinges, and set the angular velocities that all rows together give. */
 void take_hinge_rows(const SolverRow *rows, int count, int body) {
     for (const SolverRow *r = rows; r < rows + count; r++) {
         int n = r->from % 3;

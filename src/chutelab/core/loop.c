@@ -1,25 +1,25 @@
-/* The run: releases and rides, steps, and how tracks end. */
+/* The run: releases, rides, steps, and the ends of tracks. */
 
 #include <string.h>
 #include "core.h"
 
 World W;
 
-/* s on Earth; within it everything of a settled crowd is calm. */
+/* s on Earth; a crowd has settled if everything has been calm for so long. */
 #define SETTLED 0.1
-/* After two steps that were cut short impulses may grow by so much; noise grows, too. */
+/* Greatest factor by which impulses are scaled up after two steps that were cut short, as their errors are scaled, too. */
 #define MOST_AGAIN 2.0
-/* rad; between knots round the pulley. A cubic through them is off by rho angle^4 / 384, 9e-10 rho. */
+/* rad between knots round the pulley: a cubic through them is off by rho angle^4 / 384, 9e-10 rho. */
 #define ARC_ANGLE 0.024
-/* Knots that one impact may write per disk. */
+/* Greatest number of knots that an impact writes for a disk. */
 #define KNOTS_EACH 6
 
 /* ------------------------------------------------------------------------------------------ rides */
 
-/* Place and velocity of a rider: along the belt, then round the pulley, at constant speed. */
+/* Position and velocity of a rider: along the belt, then round the pulley, at constant speed. */
 static void ride_at(const Disk *d, double t, double *place) {
     double along = d->ride_x + d->ride_speed * (t - d->ride_from), rho = d->ride_rho;
-    /* From the top of the pulley on, clockwise; the belt meets it before. */
+    /* Angle from the top of the pulley, clockwise; where the belt meets the pulley it is -incline. */
     double phi = MAX(along, 0) / rho - W.ride_incline;
     double c = phi != 0 ? cos(phi) : 1, s = phi != 0 ? sin(phi) : 0;
     place[0] = rho * s + MIN(along, 0) * c;
@@ -28,8 +28,9 @@ static void ride_at(const Disk *d, double t, double *place) {
     place[3] = 0 - d->ride_speed * s;
 }
 
-/* Note at t whether a disk is spared: a gate shuts on it, or it is on the side from which a surface lets it through; or
-   that it is clear of what spared it. What lasts in a crowd may have sunk into others so far. */
+/* Set whether a surface ignores a disk from t on: a gate closes on it, or it is on the side from which a one-sided
+   surface lets it pass; or it is clear of such a surface again. In a crowd, a disk in contact may overlap by SUNK without
+   being ignored. */
 void spare(const Disk *d, const Surface *s, double t) {
     double place[4] = {d->x, d->y, 0, 0}, side = 0, deep = (W.interact ? SUNK : 1e-9) * d->radius;
     int comes = s->opens == t, *spared = spared_by(s, d);
@@ -39,7 +40,7 @@ void spare(const Disk *d, const Surface *s, double t) {
     *spared = side < 0 || (comes ? gap < -deep : *spared && gap < 0);
 }
 
-/* When the next surface comes or goes, or its travel changes, s. */
+/* When the next surface appears or vanishes, or its motion changes, s. */
 static double next_gate(double t) {
     double next = next_turn(t);
     for (int k = 0; k < W.surface_count; k++) {
@@ -49,8 +50,8 @@ static double next_gate(double t) {
     return next;
 }
 
-/* Gap of a rider at t to the nearest surface that is there and not its own, and that surface; `way` is how far it can go
-   before it comes to any, also to one that lets it through. */
+/* Gap at t between a rider and the nearest surface that exists, is not its own and does not let it pass, and which one
+   that is. `way` is how far the rider can go before it reaches any surface, including those that let it pass. */
 static double ride_gap(const Disk *d, double t, int *which, double *way) {
     double place[4], nx, ny, least = INFINITY;
     *way = INFINITY;
@@ -69,9 +70,9 @@ static double ride_gap(const Disk *d, double t, int *which, double *way) {
     return least;
 }
 
-/* Set when a ride ends: where cos phi = v^2 / (g rho), at once where the belt meets the pulley if that
-   is more than cos phi there, or where another surface is met. The gap there shrinks by no more than
-   the way, so the way may be looked at in strides of the gap, up to where a gate comes or goes. */
+/* Set when a ride ends: where cos phi = v^2 / (g rho); at once where the belt meets the pulley, if that is more than cos
+   phi there; or where it meets another surface. Its gap changes by no more than the path, so the search advances by the
+   gap, and stops where a gate changes. */
 static void plan_ride(Disk *d, double from) {
     double v = d->ride_speed, rho = d->ride_rho, c = W.g > 0 ? v * v / (W.g * rho) : 1, t = from;
     double turn = c < cos(W.ride_incline) ? acos(c) + W.ride_incline : 0;
@@ -101,7 +102,7 @@ static void plan_ride(Disk *d, double from) {
     }
 }
 
-/* Put a rider on a parabola that agrees with its ride now and at the end of the step. */
+/* Set a rider on the parabola that has its position now and at the end of the step. */
 static void ride_on(Disk *d, double t, double end) {
     double now[4], then[4], h;
     end = MIN(end, d->ride_to);
@@ -116,7 +117,7 @@ static void ride_on(Disk *d, double t, double end) {
     d->spin = 0;
 }
 
-/* Write a knot of a ride at t; the belt does the work by which gravity would change its speed. */
+/* Write a knot of a ride at t. The speed is constant, so the belt does the work against gravity. */
 static void ride_knot(int i, double t) {
     Disk *d = W.disks + i;
     double place[4], *knot = W.tracks[i].knot, entries[3] = {0, 0, 0};
@@ -144,7 +145,7 @@ static void write_ride(int i, double until) {
     if (until > W.tracks[i].knot[0]) ride_knot(i, until);
 }
 
-/* Knots that a ride may take, at the most. */
+/* Greatest number of knots that the rest of a ride may take. */
 static int ride_knots(const Disk *d) {
     double most = 1.6 + MAX(W.ride_incline, 0);
     return d->mode <= RIDING && d->ride_rho > 0 ? 4 + (int)(most / ARC_ANGLE) : 0;
@@ -162,24 +163,24 @@ static void take_off(int i) {
     W.tracks[i].lasted = 0;
 }
 
-/* Have what is released be of those that are live. */
+/* Add a released disk to those that are live. */
 static void list_one(int i) {
     int n = W.live_count++;
     for (; n > 0 && W.live[n - 1] > i; n--) W.live[n] = W.live[n - 1];
     W.live[n] = i;
 }
 
-/* List all that are live as a step begins. */
+/* List all disks that are live as a step begins. */
 static void list_live(void) {
     W.live_count = 0;
     for (int i = W.low; i < W.high; i++)
         if (is_live(W.disks + i)) W.live[W.live_count++] = i;
 }
 
-/* Release a disk at t if its place is free; its event is then the end of a ride, or an impact. */
+/* Release a disk at t, if its place is free. Its next event is then the end of a ride, or an impact. */
 static int release(int i, double t) {
     Disk *d = W.disks + i;
-    /* It does not turn while it waits. */
+    /* It does not rotate while it waits. */
     d->t = d->since = t;
     if (!d->goes_on && !place_is_free(i, d->x, d->y, t)) {
         d->waited = 1;
@@ -216,7 +217,7 @@ static void separate(int i) {
 
 /* ------------------------------------------------------------------------------------------- ends */
 
-/* End the track of a disk that leaves the scene in this step, where it does: outwards over an edge. */
+/* End the track of a disk that leaves the scene in this step, at the time when it crosses an edge outwards. */
 static void leave(int i, double end) {
     Disk *d = W.disks + i;
     double first = INFINITY, h = end - d->t;
@@ -239,7 +240,7 @@ static void leave(int i, double end) {
     finish(i, BY_EXIT);
 }
 
-/* End all tracks at the end of the run: what lasts in contact halfway through a step's impulses. */
+/* End all tracks at the end of the run; those in lasting contact halfway through the impulses of the step. */
 static void stop_all(int reason) {
     for (int i = W.low; i < W.high; i++)
         if (W.disks[i].mode == FREE && W.disks[i].supports && W.tracks[i].lasted) take_back(i);
@@ -272,7 +273,7 @@ static void stop_all(int reason) {
     if (W.hinges) finish_hinges(W.t);
 }
 
-/* Whether everything of a crowd has been calm for long enough, nothing moves, and no gate is still to come or go. */
+/* Whether a crowd has settled: all of it has been calm for long enough, no surface moves, and no gate will change. */
 static int has_settled(void) {
     if (W.stirs || next_gate(W.looked) < INFINITY) return 0;
     for (int i = W.low; i < W.high; i++) {
@@ -284,7 +285,7 @@ static int has_settled(void) {
 
 /* ------------------------------------------------------------------------------------------ steps */
 
-/* Tell which surfaces are there; what sleeps wakes when one comes or goes. Next change, s. */
+/* Set which surfaces exist at t. All sleepers wake when one appears or vanishes. Return the time of the next change, s. */
 static double set_gates(double t) {
     W.looked = t;
     if (!W.gate_count && !W.mover_count && W.step_count > 0) return INFINITY;
@@ -298,7 +299,7 @@ static double set_gates(double t) {
             for (int i = W.low; i < W.high; i++)
                 if (W.disks[i].mode == ASLEEP) wake(i, W.t);
         s->there = there;
-        /* Pieces that follow each other in a chain share what they spare. */
+        /* Pieces of a chain share a column of `spared`. */
         int is_first = s->gate >= 0 && (k == 0 || s->gate != s[-1].gate);
         for (int i = W.low; i < W.high && is_first; i++) {
             if (!is_live(W.disks + i)) continue;
@@ -309,7 +310,7 @@ static double set_gates(double t) {
     return W.gate_count || W.mover_count ? next_gate(t) : INFINITY;
 }
 
-/* A sleeper that rides a belt wakes where that ends, and one that something moves against. */
+/* Wake a sleeper that rides a belt where the belt ends, and one that a moving surface reaches. */
 static void look_ahead(int i) {
     Disk *d = W.disks + i;
     const int *list;
@@ -333,9 +334,9 @@ static void look_ahead(int i) {
     }
 }
 
-/* Step of a disk by itself, s, `h` at most, in which it goes by no more than TURN of the room that a
-   hollow leaves it: whether that holds it, did, or it is at its opening, in touch with both ends. What
-   lasts on another piece comes no further than to it. */
+/* Step of a disk by itself, s, at most `h`, in which it moves by no more than TURN of the room that an arc leaves it.
+   That holds if the arc supports it, or did, or if it is at the opening and touches both ends. If it lies on another
+   piece, a step may take it up to the arc. */
 static double hollow_step(const Disk *d, double h) {
     double speed = sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * h, nx, ny;
     if (speed * h <= TURN * W.room) return h;
@@ -350,9 +351,10 @@ static double hollow_step(const Disk *d, double h) {
     return h;
 }
 
-/* Height of a ledge up to which a joint is smooth to a disk by itself in a step, m. Closing the gap there
-   in one step gives it ledge / h. By a ledge that is felt its way would be turned by sqrt(2 ledge / r), the angle at
-   which it meets the edge: where that is less, the step is short enough for the blow. */
+/* Height of a ledge up to which a joint counts as smooth for a disk by itself in a step, m. To close the gap at a ledge
+   in one step gives the speed ledge / h. An impact at the edge of a ledge turns the path by sqrt(2 ledge / r), the angle
+   at which the disk meets the edge: where the speed ledge / h is larger than such an impact gives, the step is short
+   enough to resolve the impact. */
 static double ledge_in(const Disk *d, double h) {
     double way = (sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * h) * h;
     return MAX(2 * way * way / d->radius, TOUCHING * d->radius);
@@ -364,8 +366,9 @@ static void set_step(double h) {
     W.skip = SKIP / h;
 }
 
-/* Longest step in which what touches the insides of arcs in a crowd does not hop too far, and a corner, whose gap is
-   bent by what turns, in this step of a length h, no faster than weight makes it, without gravity weight on Earth, s. */
+/* Longest step, s, for two limits: disks inside arcs in a crowd hop no higher than HOP; and a corner, whose gap changes
+   at an accelerated rate while its particle rotates, is not moved faster by that than by its weight (without gravity, by
+   its weight on Earth). `h` is the length of the present step. */
 static double bent_step(double h) {
     double most = INFINITY, press = (W.g > 0 ? W.g : EARTH) + W.haste, u[3];
     for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
@@ -379,7 +382,7 @@ static double bent_step(double h) {
     return most;
 }
 
-/* Note what all disks have together as a step begins. */
+/* Record the energy and the ledger entries of all disks at the beginning of a step. */
 static void note_totals(void) {
     Total all = {.t = W.t, .unsolved = W.unsolved, .released = W.released};
     all.kinetic = W.ended[0];
@@ -399,7 +402,7 @@ static void note_totals(void) {
         } else if (d->mode == ASLEEP) {
             v = &d->ux;
         } else if (d->mode == RIDING) {
-            /* What the belt has done since the last knot, see `ride_knot`. */
+            /* The work of the belt since the last knot, see `ride_knot`. */
             ride_at(d, W.t, state);
             place = state;
             v = place + 2;
@@ -413,8 +416,8 @@ static void note_totals(void) {
     W.totals[W.total_count++] = all;
 }
 
-/* Begin a step: where prescribed paths lead, which disks may meet, which contacts last. A status other
-   than DONE says what was too small, and nothing has happened yet. */
+/* Begin a step: paths of riders and sleepers, pairs that may meet, lasting contacts and their solve. If an array is too
+   small, return a `Full` status; the step can then be begun again. */
 static int begin_step(void) {
     int woke;
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
@@ -432,9 +435,8 @@ static int begin_step(void) {
     W.usual = h;
     set_step(h);
     if (!W.interact) W.ledge = ledge_in(W.disks + W.low, h);
-    /* Steps end where a surface comes or goes, and at the end of the run; none is a short rest: two
-       shorter ones share what is left. At the very end a step is solved for what lasts, and not gone
-       through. */
+    /* Steps end where a surface appears or vanishes, and at the end of the run. To avoid a very short last one, two equal
+       steps share what is left. At the very end a step is solved for lasting contacts, but not carried out. */
     double stop = W.t < W.end_time ? MIN(next, W.end_time) : W.t + h;
     if (stop - W.t < (1 + 1e-9) * h) h = stop - W.t;
     else if (stop - W.t < 2 * h) h = 0.5 * (stop - W.t);
@@ -446,11 +448,11 @@ static int begin_step(void) {
     h = W.step_end - W.t;
     box_movers(W.t, h);
     if (W.hinges) bound_hinges(W.t, h);
-    /* Impulses stand for half of the step before and half of this one. */
+    /* Impulses act for half of the step before and half of this one. */
     double span = W.length_before + W.length;
     W.length_before = W.length;
     if (W.joint_count) {
-        /* Strings that rattle may end it sooner. */
+        /* Strings that pull and go slack may end the step earlier. */
         tie_joints();
         h = W.step_end - W.t;
     }
@@ -478,14 +480,14 @@ static int begin_step(void) {
         if (!room || woke) drop_tugs();
         if (!room) return near ? FULL_CONTACTS : FULL_NEAR;
         if (stride > W.step && W.contact_count) {
-            /* It does not fly: what it touches is solved for a step of usual length. */
+            /* It is not in flight: its contacts are solved for a step of the usual length. */
             stride = 0;
             W.step_end = MIN(W.t + W.step, W.step_end);
             h = W.step_end - W.t;
             woke = 1;
         }
         double most = bent_step(h);
-        /* What a joint spins fast by a short arm: Newton's steps find its pull in shorter ones. */
+        /* A joint with a short arm that spins fast: Newton's method finds its pull in shorter steps. */
         if (W.joint_count && missed_by_joints() > 0) most = MIN(most, MAX(0.5 * h, SHORTEST * W.usual));
         if (h > (1 + 1e-9) * most) {
             set_step(most);
@@ -507,7 +509,7 @@ static int begin_step(void) {
         W.unsolved = MAX(W.unsolved, missed_by_joints());
     }
     W.unsolved_most = MAX(W.unsolved_most, W.unsolved);
-    /* A fast belt may have thrown a disk further than its list of neighbours foresaw. */
+    /* A fast belt may have thrown a disk further than its list of neighbours allowed for. */
     for (EACH_LIVE(i))
         W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);
     if (W.joint_count) tug_all(-1);
@@ -517,20 +519,22 @@ static int begin_step(void) {
         W.step_end = meet_stops(W.t, W.step_end);
         bound_hinges(W.t, W.step_end - W.t);
     }
-    /* What has corners is released in a step of no length. */
+    /* A particle with corners is released in a step of length 0: note the totals of an instant once. */
     int again = W.outline_count && W.total_count && W.totals[W.total_count - 1].t == W.t;
     if (W.interact && !again) note_totals();
     return DONE;
 }
 
-/* Have what is tied go on with the pull that ends the step as it is now. */
+/* Foresee the events of all particles with joints anew, after the end of the step, up to which the joints pull, has
+   changed. */
 static void foresee_tied(void) {
     for (int i = W.low; i < W.high; i++)
         if (is_tied(i) && W.disks[i].mode == FREE) foresee(i);
 }
 
-/* A blow of a particle that has joints ends the step, whose pull is then found anew, and is given as the next one
-   begins, before all else: return the disk, or -1, that has got too many. */
+/* An impact of a particle with joints ends the step: the pull of the joints is solved anew for the shorter step, and the
+   impact is resolved at the beginning of the next one, before all else. Return the disk if it had too many impacts, else
+   -1. */
 static int meet_tied(int i, int j, double t) {
     double soon = SOON * W.step;
     if (t > W.t + soon && t > W.step_end - soon) expect(i, INFINITY, ALARM);
@@ -548,7 +552,7 @@ static int meet_tied(int i, int j, double t) {
     return -1;
 }
 
-/* Resolve what happens within the step, in the order of time. */
+/* Resolve the events within the step in the order of time. */
 static int go_through(void) {
     int i, count = W.high - W.low;
     for (;;) {
@@ -568,7 +572,7 @@ static int go_through(void) {
             continue;
         }
         W.now = t;
-        /* A blow as the step begins may go on to what is tied. */
+        /* An impact at the beginning of a step may pass on to particles with joints. */
         if (j != ALARM && (is_tied(i) || is_tied(j) || (W.joint_count && t <= W.t))) {
             if ((W.stalled = meet_tied(i, j, t)) < 0) continue;
             return STALLED;
@@ -595,7 +599,7 @@ static void end_step(void) {
     for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         if (!is_live(d)) continue;
-        /* What is tied ends with the step, as its joints' pull does. */
+        /* A particle with joints can leave only at the end of the step, as the pull of its joints lasts until then. */
         if (d->mode != RIDING && !is_tied(i)) leave(i, W.step_end);
         if (d->mode == FREE) {
             advance(d, W.step_end);
@@ -630,7 +634,7 @@ static void end_step(void) {
     }
 }
 
-/* Whether all of this part of the run have ended, or nothing can happen any more, and why it ends then. */
+/* Whether all disks of this part of the run have ended, or nothing can happen any more, and the reason for the end. */
 static int is_over(int *reason) {
     int awake = 0;
     double next = INFINITY;
@@ -645,13 +649,13 @@ static int is_over(int *reason) {
         if (W.hinges && d->mode == WAITING && d->release < W.end_time) awake = 1;
         if (d->mode == WAITING) next = MIN(next, MAX(d->release, W.t));
     }
-    /* Hinges go on to a time that is given, else as long as disks do. */
+    /* Hinges move on until a given time, else as long as there are disks. */
     if (W.hinges) return !awake && W.until != UNTIL_TIME;
     if (W.interact && W.until == UNTIL_SETTLED && has_settled()) {
         *reason = BY_SETTLING;
         return 1;
     }
-    /* A run that has been paused where one changes has not looked at it yet. */
+    /* If a run was paused at the time of a change, that change has not been applied yet. */
     next = MIN(next, MAX(next_gate(W.looked), W.t));
     int asleep = 0;
     for (int i = W.low; i < W.high; i++) asleep |= W.disks[i].mode == ASLEEP;
@@ -665,7 +669,7 @@ static int is_over(int *reason) {
     return !(asleep && next < W.end_time) && next >= W.end_time;
 }
 
-/* Begin with the next disk of a run without contacts between them, or with all; 0 at the end. */
+/* Begin with the next disk, if disks do not meet, or with all of them; return 0 at the end. */
 static int begin_part(void) {
     W.low = W.high;
     if (W.low >= W.disk_count) return 0;
@@ -697,7 +701,7 @@ static int begin_part(void) {
 
 enum Phase { PART, STEP, WITHIN };
 
-/* A disk by itself needs no step before it flies. */
+/* A disk by itself is released outside of steps, and needs none while it rides. */
 static int begin_alone(void) {
     int i = W.low;
     Disk *d = W.disks + i;
@@ -721,7 +725,7 @@ static int begin_alone(void) {
     return 1;
 }
 
-/* The fastest of all, once no step is short enough for it; else -1. */
+/* The fastest disk, once time can no longer advance by a step that is short enough for it; else -1. */
 static int too_fast(void) {
     int found = W.low;
     double most = 0;
@@ -736,7 +740,7 @@ static int too_fast(void) {
     return found;
 }
 
-/* Run on for at most so many steps: a `Status`, or what is `Full`. */
+/* Run for at most so many steps; return a `Status` or `Full`. */
 static int run_on(int steps) {
     int status;
     for (;;) {
@@ -791,9 +795,8 @@ static int run_on(int steps) {
     }
 }
 
-/* Where `World` is. */
-/* Run on for at most so many steps; see `Status`. What the host has taken by the next call makes room for
-   knots and events, if they were many: else there is more of it then. */
+/* Run for at most so many steps; see `Status`. If knots or events are full, the host takes them before the next call; if
+   there were few to take, their room is doubled then. */
 EXPORT int run(int steps) {
     int status = W.full;
     for (W.full = 0; !status || make_room(status);) {

@@ -1,29 +1,30 @@
-/* From what a host says of a machine to what the core works with. */
+/* Prepare a run: from what the host says of a machine, derive what the core works with. */
 
 #include <string.h>
 #include "core.h"
 #include "trig.h"
 
-/* rad; directions that differ by less are one. */
+/* rad, and share of a curvature; smaller differences of directions, or of curvatures, count as none. */
 #define ALIKE 1e-9
 
-/* Radii, rad: pieces whose ends are no further apart and whose directions there differ by no more
-   are one smooth surface, as one whose points are written with some digits is meant to be. */
+/* Pieces join smoothly if their ends are no further apart than JOINED radii and their directions there differ by at most
+   SMOOTH (rad): points of a scene are written with few digits. */
 #define JOINED 1e-3
 #define SMOOTH 1e-2
 
-/* Most sweeps of the contact solver in a step: with 60 a pile of 2,000 hardly comes to rest. */
+/* Greatest number of sweeps of the contact solver in a step, in a crowd and for a disk by itself. With 60 a pile of 2,000
+   hardly comes to rest. */
 #define SWEEPS 100
 #define SWEEPS_ALONE 500
 
-/* Whether a disk of radius r can touch both ends of an arc at a time, or nearly. */
+/* Whether a disk of radius r can touch both ends of an arc at once, or nearly so. */
 static int is_narrow(const Surface *s, double r) {
     double half = 0.5 * s->extent;
     if (s->shape != ARC) return 0;
     return s->radius <= r || (half > 0.5 * PI && s->radius * sin(half) <= (1 + TOUCH) * r);
 }
 
-/* A piece is met in one place at a time: make two of each narrow arc. */
+/* Split each narrow arc in two: the engine looks for one contact of a disk with a piece. */
 static void split_arcs(double r) {
     int narrow = 0;
     for (int k = 0; k < W.surface_count; k++) {
@@ -87,7 +88,7 @@ static void derive(Surface *s) {
     }
 }
 
-/* One end of a piece, and the unit vector by which the piece would go on there. */
+/* One end of a piece, and the unit vector in which the piece would continue there. */
 static void at_end(const Surface *s, int end, double *place, double *onward) {
     double way = end ? 1 : -1;
     place[0] = s->end[2 * end];
@@ -96,15 +97,15 @@ static void at_end(const Surface *s, int end, double *place, double *onward) {
     onward[1] = way * (s->shape == SEGMENT ? s->ty : (place[0] - s->x) / s->radius);
 }
 
-/* How far an end lies in a skew direction, which few joints lie across: ends in one place are close in it,
-   by no more than 1.2 times their distance. */
+/* Key of an end for sorting: its coordinate in an oblique direction, along which few joints have the same value. Keys of
+   two ends differ by at most 1.2 times their distance. */
 static double rank(int end) {
     const double *place = W.surfaces[end / 2].end + 2 * (end % 2);
     return place[0] + 0.61803398875 * place[1];
 }
 
-/* Sort all ends of segments and arcs, as 2 k and 2 k + 1 of surface k, into `W.ends`; behind them stand
-   the circles but the pulley. */
+/* Sort the ends of all segments and arcs (2 k and 2 k + 1 of surface k) into `W.ends` by `rank`, and list the circles
+   except the drive pulley behind them. */
 static void sort_ends(void) {
     W.end_count = 0;
     for (int k = 0; k < W.surface_count; k++)
@@ -121,7 +122,7 @@ static void sort_ends(void) {
         }
 }
 
-/* The first row of `W.ends` that may be in the place of an end; from there on they are up to `last`. */
+/* The first entry of `W.ends` that may be at the place of an end; the last one has no larger rank than `last`. */
 static int first_near(int end, double r, double *last) {
     double first = rank(end) - 2 * JOINED * r;
     int low = 0, high = W.end_count;
@@ -134,7 +135,8 @@ static int first_near(int end, double r, double *last) {
     return low;
 }
 
-/* Note which piece goes on smoothly beyond an end: an arc, or beyond a segment an arc or circle; or -1. */
+/* Set which piece continues smoothly beyond an end: beyond a segment an arc or a circle, beyond an arc also a segment; or
+   -1. */
 static void find_mate(int k, int end, double r) {
     Surface *s = W.surfaces + k;
     double place[2], onward[2], other[2], back[2], last;
@@ -169,7 +171,7 @@ static void find_mate(int k, int end, double r) {
     }
 }
 
-/* Ends in one place but for rounding are one point, of the first piece that ends there. */
+/* Move an end to the end of the first piece that ends at the same place within rounding, so that both are one point. */
 static void share_end(int k, int n, double near, double r) {
     double *end = W.surfaces[k].end + 2 * n, last;
     int first = 2 * k;
@@ -185,16 +187,16 @@ static void share_end(int k, int n, double near, double r) {
     end[1] = W.surfaces[first / 2].end[2 * (first % 2) + 1];
 }
 
-/* Curvature of the way out of a piece at an end, 1/m; > 0: to the left. */
+/* Curvature of a piece as it is followed outwards at an end, 1/m; positive to the left. */
 static double curl_of(const Surface *s, int end) {
     return s->shape == SEGMENT ? 0 : (end ? -1 : 1) / s->radius;
 }
 
-/* Find the middle of the half of an end's rim that goes on from the left side of a piece, of an arc its
-   outside; the other half goes on from the other side. At a free end that is the normal on that side.
-   Where other pieces end, a disk rolls round the end only where the angle between two of them is more than
-   pi: all of that rim goes on from the side that faces it, also where it is wider than a quarter turn, and
-   its middle bisects that angle. */
+/* Set the crown of an end: the unit vector to the middle of that half of its rim that belongs to the left side of the
+   piece (of an arc, its outside); the other half belongs to the other side. At a free end it is the normal on that side.
+   Where other pieces end at the same point, a disk rolls round it only if the angle between two neighbours is above pi:
+   then all of that rim, even if it is wider than a quarter turn, belongs to the side that faces it, and its middle
+   bisects that angle. */
 static void find_crown(int k, int n, double r) {
     Surface *s = W.surfaces + k;
     double place[2], out[2], there[2], back[2], last, least = INFINITY, most = -INFINITY;
@@ -233,7 +235,7 @@ static void find_crown(int k, int n, double r) {
     crown[1] -= sense * (other[0] + way * (out[1] + other[1]));
 }
 
-/* Lay out what the host fills in. */
+/* Reserve the arrays that the host fills in. */
 EXPORT int lay_out_world(void) {
     W.material_count = W.surface_count;
     RESERVE(W.disks, W.disk_count);
@@ -252,7 +254,7 @@ static void make_near_room(int room) {
     RESERVE(W.near_links, 2.0 * room);
 }
 
-/* Of contacts those of the step before are kept. */
+/* Make room for contacts; those of the step before are kept. */
 static void make_contact_room(int room) {
     const Contact *old = W.earlier;
     W.contact_room = room;
@@ -267,13 +269,13 @@ static void make_contact_room(int room) {
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
 }
 
-/* Make twice the room for states of hinges; return whether there is such. */
+/* Double the room for states of hinges; return whether there is memory. */
 int stretch_swings(void) {
     W.swing_work = stretch(W.swing_work, 3 * W.swing_count, 3 * W.swing_room, sizeof *W.swing_work);
     return W.swing_work && STRETCH(W.swings, W.swing_count, W.swing_room);
 }
 
-/* Make twice the room for what is full. */
+/* Double the room for what is full. */
 int make_room(int full) {
     if (full == FULL_NEAR) make_near_room(2 * W.near_room);
     if (full == FULL_CONTACTS) make_contact_room(2 * W.contact_room);
@@ -284,7 +286,7 @@ int make_room(int full) {
     return has_room();
 }
 
-/* Lay out all that the core works with, but for `spared`. */
+/* Reserve all arrays that the core works with, except `spared`. */
 static int lay_out_work(void) {
     int n = W.disk_count, crowd = W.interact, room = 2 * W.surface_count, rides = 0;
     for (int i = 0; i < n; i++) rides |= W.disks[i].rides;
@@ -324,7 +326,7 @@ static int lay_out_work(void) {
     return has_room();
 }
 
-/* Find which surface goes on where another one ends; what moves only with its own. */
+/* Find which pieces continue where another one ends. A moving piece is only joined to pieces with the same motion. */
 void join_surfaces(void) {
     double least = INFINITY;
     for (int i = 0; i < W.disk_count; i++) least = MIN(least, W.disks[i].radius);
@@ -345,8 +347,7 @@ void join_surfaces(void) {
     }
 }
 
-/* Have pieces of a surface that is solid from one side share what they spare, where each goes on at an end of the one
-   before. */
+/* Let the pieces of a one-sided surface share a column of `spared` if each begins where the one before ends. */
 static void chain_pieces(double near) {
     for (int k = 1; k < W.surface_count; k++) {
         Surface *s = W.surfaces + k, *last = s - 1;
@@ -363,7 +364,7 @@ static void chain_pieces(double near) {
     }
 }
 
-/* List the joints of each disk, and their rows. */
+/* List the joints of each disk, and the rows of each joint. */
 static void join_disks(void) {
     int row = 0;
     for (int i = 0; i < W.disk_count; i++) W.disks[i].tie = -1;
@@ -381,7 +382,8 @@ static void join_disks(void) {
     }
 }
 
-/* Note the edges of a particle, and the radius of the circle round its centre that no edge cuts, and of one of its area. */
+/* Set the edges of a particle, the radius of the largest circle round its centre that no edge cuts, and that of the
+   circle of its area. */
 static void measure(Disk *d) {
     const double *p = W.outlines + 2 * d->outline;
     double twice = 0, *edge = W.edges + 3 * d->outline;
@@ -398,13 +400,13 @@ static void measure(Disk *d) {
     if (d->corners) d->broad = sqrt(0.5 * twice / PI);
 }
 
-/* The host has filled in what is marked [in]: fill in what follows. */
+/* Prepare a run after the host has filled in what is marked [in]. Return 0 if there is no memory. */
 EXPORT int prepare(void) {
     W.passes = W.hinges = W.joint_row_count = 0;
     for (int i = 0; i < W.kind_count * W.kind_count; i++)
         W.passes |= pair_of(i / W.kind_count, i % W.kind_count)->restitution < 0;
     for (int k = 0; k < W.mover_count; k++) W.hinges += W.movers[k].inertia > 0;
-    /* What hangs gives what one disk gives it to another. */
+    /* Hinges, triggers, joints and corners are only solved with all disks together. */
     if (W.hinges || W.trigger_count || W.joint_count || W.outline_count) W.interact = 1;
     for (int k = 0; k < W.trigger_count; k++) W.triggers[k].t = INFINITY;
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
@@ -454,7 +456,8 @@ EXPORT int prepare(void) {
     W.pace = W.g > 0 ? sqrt(W.g / EARTH) : 1;
     W.smooth_v = 1e-4 * W.pace;
     W.accurate = (alone ? 1e-15 : 3e-4) * W.pace;
-    /* What is nearly at rest is not to be kept awake by what sweeps leave. */
+    /* Sweeps end at a tenth of the speed below which disks count as at rest, else their remaining errors would keep a
+       pile awake. */
     if (!alone && W.g > 0) W.accurate = 0.1 * REST * sqrt(W.g * least);
     for (int k = 0; k < W.mover_count; k++)
         if (W.movers[k].inertia > 0) prepare_hinge(W.movers + k);

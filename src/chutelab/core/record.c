@@ -1,11 +1,11 @@
-/* What a run leaves behind: knots, events, entries of the ledger. */
+/* What a run records: knots, events, entries of the ledger. */
 
 #include <string.h>
 #include "core.h"
 
-/* A track is kept as states: before and after each blow, and, of what lasts in contact, one a step. A state
-   becomes a knot only where the track bends by more than may be left out, see `is_followed`; those since the
-   last knot wait, until the cubic from there no longer leads past all of them. */
+/* A track is recorded as states: before and after each impact, and one a step in lasting contact. A state becomes a knot
+   only where it has to, see `is_followed`: the states since the last knot wait until the cubic from that knot to the
+   newest state no longer agrees with all of them. */
 
 static Knot *waiting(int i) { return W.waits + WAITS * (long)(W.interact ? i : 0); }
 
@@ -13,15 +13,16 @@ static void emit(const Knot *state) {
     W.knots[W.knot_count++] = *state;
 }
 
-/* The angle at a share of the way to a state: even accelerations, corrected evenly. */
+/* The angle at the share s of the time from the last knot to a state: a constant angular acceleration, with the
+   difference to the true angle spread evenly over time. */
 static double turned_by(const Track *track, const Knot *to, double s) {
     double h = to->t - track->from[0], spin = track->from[5], even = to->angle - track->angles[0] - 0.5 * h * (spin + to->spin);
     return track->angles[0] + s * (h * (spin + 0.5 * s * (to->spin - spin)) + even);
 }
 
-/* Whether the cubic from the last knot to a state leads past all that wait: as near in place, velocity and
-   entries as a track may be off. In a crowd that is a hop: what lasts hops from step to step, g h2 / 8 high, and
-   its track leaves that out; blows and bends that are smaller, of a velocity of g h, are left out with it. */
+/* Whether the cubic from the last knot to a state agrees with all states that wait, within the tolerance of a track in
+   place, velocity and entries. In a crowd the tolerance is a hop: a disk in lasting contact hops from step to step, g h^2
+   / 8 high, and its track leaves the hops out, and with them impacts and bends that change its velocity by less than g h. */
 static int is_followed(const Track *track, const Knot *wait, const Knot *to, const Disk *d) {
     const double *from = track->from;
     double h = to->t - from[0], fall = W.hops * W.g * W.usual;
@@ -32,7 +33,8 @@ static int is_followed(const Track *track, const Knot *wait, const Knot *to, con
     Two bend = minus(minus(times(3, way), times(2, first)), last), turn = minus(plus(first, last), times(2, way));
     Two entries = two(from + 7), more = minus(two(to->entries + 1), entries);
     for (const Knot *k = wait + track->waits - 1; k >= wait; k--) {
-        /* Off by w at both ends of a time T, it bulges by w T / 4 between them: by no more than it is off. */
+        /* A velocity that is off by w at both ends of a time T moves the curve by w T / 4 in the middle: that is at most
+           the tolerance of the place. */
         double then = k < wait + track->waits - 1 ? k[1].t : to->t, before = k > wait ? k[-1].t : from[0];
         double s = (k->t - from[0]) / h, most = MIN(slow, 4 * close / MAX(then - k->t, k->t - before));
         Two off = minus(plus(place, times(s, plus(first, times(s, plus(bend, times(s, turn)))))), two(&k->x));
@@ -48,8 +50,8 @@ static int is_followed(const Track *track, const Knot *wait, const Knot *to, con
     return 1;
 }
 
-/* Write the latest state that waits as a knot; if it is the one after a blow, that before, too, unless a crowd's
-   track may leave the blow out. */
+/* Write the latest waiting state as a knot. If it follows an impact, write the state before the impact, too, unless in a
+   crowd the track may leave the impact out. */
 static void write_waiting(int i) {
     Track *track = W.tracks + i;
     const Knot *wait = waiting(i), *last = wait + track->waits - 1;
@@ -64,8 +66,8 @@ static void write_waiting(int i) {
     track->waits = 0;
 }
 
-/* Forget every second of the states that wait, but the last two: the longer the times between those that are
-   left, the less `is_followed` allows. */
+/* Drop every second waiting state except the last two. Since times between the others grow, `is_followed` allows smaller
+   errors of velocity. */
 static void thin_out(Track *track, Knot *wait) {
     int left = 0;
     for (int n = 1; n < track->waits; n++)
@@ -73,7 +75,7 @@ static void thin_out(Track *track, Knot *wait) {
     track->waits = left;
 }
 
-/* Note a state of a disk: t, x, y, vx, vy, spin. Of several at one instant the first and the last are kept. */
+/* Note a state of a disk: t, x, y, vx, vy, spin. Of several states at the same instant the first and the last are kept. */
 static void note(int i, const double *state, double angle, const double *entries) {
     Track *track = W.tracks + i;
     Knot *wait = waiting(i), now = {.disk = i, .angle = angle};
@@ -94,7 +96,7 @@ static void note(int i, const double *state, double angle, const double *entries
     wait[track->waits++] = now;
 }
 
-/* Write the state of a disk as it is. */
+/* Write the present state of a disk as a knot. */
 void knot_now(int i) {
     Disk *d = W.disks + i;
     double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
@@ -102,13 +104,13 @@ void knot_now(int i) {
     write_waiting(i);
 }
 
-/* The same of what ends in lasting contact: the state that was noted last, with the entries as they are. */
+/* The same for a disk that ends in lasting contact: it replaces the state noted last, as entries have changed since. */
 void knot_held(int i) {
     W.tracks[i].waits--;
     knot_now(i);
 }
 
-/* Note the state in which a path ends, unless it is the last one anyhow. */
+/* Note the state at the end of a path, unless it was noted last already. */
 void knot_before(int i, double t, double vx, double vy, double spin) {
     Disk *d = W.disks + i;
     double state[6] = {t, d->x, d->y, vx, vy, spin};
@@ -116,7 +118,7 @@ void knot_before(int i, double t, double vx, double vy, double spin) {
     if (memcmp(state, W.tracks[i].knot, sizeof state)) note(i, state, d->turned, d->entries);
 }
 
-/* Note the state after a blow; that of a disk by itself is a knot. */
+/* Note the state after an impact; for a disk by itself it becomes a knot at once. */
 void knot_after(int i) {
     const Disk *d = W.disks + i;
     double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
@@ -124,7 +126,7 @@ void knot_after(int i) {
     if (!W.interact) write_waiting(i);
 }
 
-/* End the smooth part of a track: the state halfway through the last impulses is noted, now that after. */
+/* End the smooth part of a track: the state halfway through the last impulses has been noted, now that after them is. */
 void flush_track(int i) {
     Track *track = W.tracks + i;
     if (!track->lasted) return;
@@ -137,9 +139,9 @@ void flush_track(int i) {
 
 /* Note the state of a disk in lasting contact, after the impulses of a step.
 
-   In contact a disk hops from step to step; its smooth track goes through the states partway through
-   the impulses of each step, halfway if steps are equal. There its velocity has no part of the hop,
-   and its entries are short of what the rest of the impulses does. */
+   In contact a disk hops from step to step. Its smooth track goes through the states partway through the impulses of each
+   step, halfway if steps are equal. There its velocity has no part of the hop, and its entries lack the work of the rest
+   of the impulses. */
 void track_lasting(int i) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
@@ -148,7 +150,7 @@ void track_lasting(int i) {
                        d->uspin + f * (d->spin - d->uspin)};
     double entries[3];
     if (d->lacks > 0) {
-        /* In a hollow the velocity turns, so that its mean is too small. */
+        /* Inside an arc the velocity turns, so its mean is too small: see `lacks` of contact.c. */
         double square_speed = square(state[3]) + square(state[4]);
         double longer = sqrt(1 + 2 * d->lacks * d->inv_mass / square_speed);
         state[3] *= longer;
@@ -165,14 +167,14 @@ void track_lasting(int i) {
     for (int n = 0; n < 3; n++) track->after_entries[n] = d->entries[n] + d->gain[n];
 }
 
-/* Note the state of a disk that flies in air, where that bends its path. */
+/* Note the state of a disk in flight whose path is bent by air. */
 void track_flying(int i) {
     const Disk *d = W.disks + i;
     double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
     if (memcmp(state, W.tracks[i].knot, sizeof state)) note(i, state, d->turned, d->entries);
 }
 
-/* End a track at its last knot. */
+/* End a track; its latest waiting state becomes the last knot. */
 void finish(int i, int reason) {
     Disk *d = W.disks + i;
     if (W.tracks[i].begun) {
@@ -188,7 +190,7 @@ void finish(int i, int reason) {
     W.done++;
 }
 
-/* Write an event; states are velocity and spin, the impulses act on disk i. */
+/* Write an event. States are velocity and spin; the impulses act on disk i. */
 void write_event(int kind, int i, int other, int owner, double t, const double *place,
                  const double *before, const double *after, double normal, double tangent) {
     Event *e = W.events + W.event_count++;
@@ -206,13 +208,13 @@ void write_event(int kind, int i, int other, int owner, double t, const double *
     e->surface = owner;
 }
 
-/* Write an event that changes nothing. */
+/* Write an event at which the state does not change. */
 void event_here(int kind, int i, int owner) {
     Disk *d = W.disks + i;
     write_event(kind, i, -1, owner, d->t, &d->x, &d->vx, &d->vx, 0, 0);
 }
 
-/* Book entries of a contact on its owner, and on one disk, or half each on two. */
+/* Add entries of a contact to those of its owner, and to those of one disk, or half of them to each of two. */
 void book(double *first, double *second, int owner, const double *entries) {
     double share = second ? 0.5 : 1;
     for (int n = 0; n < 3; n++) {
@@ -222,8 +224,8 @@ void book(double *first, double *second, int owner, const double *entries) {
     }
 }
 
-/* Book a loss, or a gain below zero, as a part of what has been lost so far, at each surface in
-   proportion. A gain beyond that waits in the last row until there is something to take it from. */
+/* Distribute a loss, or a gain if it is negative, over all surfaces in proportion to what has been lost there so far. A
+   gain that exceeds all losses waits in the last row of the books until there are losses to reduce. */
 void spread(double loss, int k) {
     double *last = W.books + 3 * W.owner_count + k, lost = 0;
     loss += MIN(*last, 0);
@@ -235,9 +237,9 @@ void spread(double loss, int k) {
     *last += loss - share * lost;
 }
 
-/* Book what contacts of a crowd gave back, their losses below zero, as a part of what has been lost, at
-   whatever surface: what parts an overlap was lost when that came to be, and a hop's height when the
-   one before ended. */
+/* Correct the books for contacts of a crowd with negative losses: such a gain is taken off what has been lost so far, at
+   any surface. The energy of an overlap that is removed was lost when the overlap came to be, and the energy of a hop
+   when the hop before ended. */
 void give_back(const Contact *list, int count) {
     for (int k = 1; k < 3 && W.interact; k++) {
         double back = 0;

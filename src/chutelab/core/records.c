@@ -1,13 +1,13 @@
-/* Runs of the engines that are judged as they end, where their records lie: nothing of them is handed
-   out and in again. This is between the engines and the laws, and reads of either what layout.h says;
-   of engines that is what the host told them, and what they wrote. */
+/* Runs that are judged at their end, where their records are in memory, so that no array is copied out and in. This is
+   between the engines and the laws, and uses only what layout.h says of either: what the host told an engine, and what
+   that engine wrote. */
 
 #include <math.h>
 #include <string.h>
 #include "laws.h"
 #include "loads.h"
 
-/* What a host may as well call itself. */
+/* Functions that a host may also call itself. */
 Exact *exact(void);
 int follow_all(int rounds);
 World *world(void);
@@ -15,7 +15,7 @@ int prepare(void);
 int run(int steps);
 Room *room(void);
 
-/* Have the laws look at knots where they are. */
+/* Have the laws read the knots in place. */
 static void take_knots(const Knot *knots, int count) {
     L.knots = (double *)knots;
     L.knot_count = count;
@@ -23,8 +23,8 @@ static void take_knots(const Knot *knots, int count) {
     L.owned = 1;
 }
 
-/* Numbers of events that are not finite: where they are, ten of them in pairs and the last two, times zero,
-   are zero. */
+/* Count the numbers of events that are not finite. Numbers times zero are zero only if all are finite: ten of them are
+   checked in pairs, then the last two. */
 PAIRED static void take_events(const Event *events, int count) {
     L.unreal = 0;
     for (const Event *e = events; e < events + count; e++) {
@@ -40,7 +40,7 @@ static char *put(char *to, const void *from, int size) {
     return to + size;
 }
 
-/* Make rows of `results.EVENT` of events, in their place: these have no gaps. Return how many bytes they are. */
+/* Convert events to rows of `results.EVENT`, in place: these have no padding. Return the number of bytes. */
 EXPORT int pack_events(Event *events, int count) {
     char *to = (char *)events;
     for (int n = 0; n < count; n++) {
@@ -116,7 +116,7 @@ static int judge_exact(void) {
     return end_up();
 }
 
-/* As `follow_all`; a run that is over, and of which all is still there, is judged. */
+/* `follow_all`; a run that has finished, and of which nothing has been taken out, is judged. */
 EXPORT int follow_and_judge(void) {
     int course = follow_all(room()->budget);
     if (course != FINISHED || !exact()->is_whole) return course;
@@ -125,7 +125,7 @@ EXPORT int follow_and_judge(void) {
     return course;
 }
 
-/* The contact engine. It makes other surfaces of those that it is told, so they are looked at before. */
+/* The contact engine. It changes the surfaces that it is given, so they are copied before. */
 
 EXPORT int prepare_to_judge(void) {
     const World *w = world();
@@ -166,7 +166,7 @@ static int judge_world(void) {
     return end_up();
 }
 
-/* As `run`; a run that is over, of particles that do not meet, and of which all is still there, is judged. */
+/* `run`; a run of particles that do not meet is judged when it has finished, if nothing has been taken out. */
 EXPORT int run_and_judge(void) {
     int status = run(room()->budget);
     const World *w = world();

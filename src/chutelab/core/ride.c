@@ -1,46 +1,44 @@
-/* The nominal particle's ride with Coulomb friction: along the incoming belt, round its pulley.
+/* The ride of the nominal particle with Coulomb friction: along the incoming belt and round its pulley.
 
-   Round the pulley its centre moves on a circle of radius rho. phi is the angle of the normal from
-   the top, clockwise; with w the speed along the circle, z = r omega, and N and F the normal and the
-   tangential force per mass,
+   Round the pulley its centre moves on a circle of radius rho. phi is the angle of the normal from the top, clockwise.
+   With the speed w along the circle, z = r omega, and the normal and tangential force per mass N and F,
 
        phi' = w/rho,  w' = g sin phi + F,  z' = (m r^2/I) F,  N = g cos phi - w^2/rho,
 
-   where F = -share g sin phi while it grips, share = I/(I + m r^2), and -sign mu N while it slips. All
-   are expanded in a Taylor series in time; a step is as long as its last terms are rounding. */
+   where F = -share g sin phi while it grips, with share = I/(I + m r^2), and -sign mu N while it slips. All of these are
+   expanded in a Taylor series in time; a step is so short that its last terms are as small as rounding. */
 
 #include "plan.h"
 
 /* Degree of the series. */
 #define ORDER 20
-/* Share of the angle (rad) and of the speeds that the last terms of a step may be. */
+/* Bound on the last terms of a step, as a share of the speeds, and rad of the angle. */
 #define LEFT_OUT 1e-16
-/* rad of the pulley between two looks for an event: no two changes of one kind are nearer. */
+/* rad of the pulley between two checks for an event: no two changes of one kind are nearer to each other. */
 #define LOOK 2.4e-2
 #define MOST_LOOKS 32
-/* Bisections of a step for the time of an event, past the last bit. */
+/* Bisections of a step for the time of an event; they end at the last bit. */
 #define HALVINGS 64
-/* Steps after which a ride counts as one without an end: the slowest fall off the very top takes
-   2,000. */
+/* Steps after which a ride counts as endless: the slowest one, from the very top, takes 2,000. */
 #define STEPS 100000
-/* rad that a particle may slide back from where it came on to the pulley. */
+/* rad by which a particle may slide back beyond the place where it came onto the pulley. */
 #define BACK 1e-9
-/* Sliding, gripping or not, and sliding back: what can follow each other on a belt. */
+/* Phases that can follow each other on a belt: slip, grip or slip in the direction of gravity, slip back. */
 #define PHASES 3
 
-/* What may end a step, and that nothing does. It ends where the particle turns round, so that it is
-   seen whether that is before the pulley. */
+/* Events that may end a step, and GOES_ON for none. TURNS ends a step where the particle turns round, so that it is known
+   whether that is before the pulley. */
 enum { LIFTS, ONSET_BACK, ONSET_FORWARD, GRIPS, RETURNS, TURNS, GAUGES, GOES_ON = GAUGES };
 
 static double sign(double a) { return (a > 0.0) - (a < 0.0); }
 
-/* 0 if friction holds a contact that has no slip now, else the way that gravity makes it slip. */
+/* 0 if friction holds a contact that has no slip now, else the direction in which gravity makes it slip. */
 static double slips_to(double pull, double normal, double friction, double share) {
     return share * fabs(pull) <= friction * normal ? 0.0 : sign(pull);
 }
 
-/* Slide or roll along the belt until the pulley is reached, `gap` m ahead, at w (m/s) and z; 0 if it
-   never is. `incline` is the belt's angle from the horizontal, rad, clockwise. */
+/* Slide or roll along the belt until the pulley is reached, `gap` m ahead, with the speeds w and z there (m/s). Return 0
+   if it is never reached. `incline` is the belt's angle from the horizontal, rad, clockwise. */
 int ride_to_pulley(double *w, double *z, double gap, double length, double gravity, double friction,
                    double share, double belt, double incline) {
     double up, across, lever = 1.0 / share - 1.0;
@@ -74,7 +72,7 @@ static double horner(const double *c, int degree, double t) {
     return value;
 }
 
-/* All gauges at a time, which together take as long as one. */
+/* Evaluate all gauges at a time; in one loop they take as long as one of them. */
 static void read_gauges(double gauges[GAUGES][ORDER + 1], double t, double values[GAUGES]) {
     for (int k = 0; k < GAUGES; k++) values[k] = 0.0;
     for (int n = ORDER; n >= 0; n--)
@@ -85,17 +83,17 @@ typedef struct { double phi[ORDER + 1], w[ORDER + 1], z[ORDER + 1], normal[ORDER
 typedef struct {
     double phi, w, z;                            /* state */
     double rho, gravity, friction, share, belt;
-    double slip, least;                          /* sign of the slip; angle where it is back */
+    double slip, least;                          /* sign of the slip; angle at which it is back where it began */
 } Ride;
 
-/* Expand a ride in time, and what turns negative at an event. */
+/* Expand a ride in time, and with it the gauges: functions that become negative at an event. */
 static void expand(const Ride *r, Series *s, double gauges[GAUGES][ORDER + 1]) {
     double sine[ORDER + 1], cosine[ORDER + 1], rates[ORDER + 1], lever = 1.0 / r->share - 1.0;
     int grips = r->slip == 0.0;
     double stick = grips ? -r->share : 0.0, load = grips ? 0.0 : -r->slip * r->friction;
     s->phi[0] = r->phi, s->w[0] = r->w, s->z[0] = r->z;
     sin_cos(r->phi, sine, cosine);
-    double square = s->w[0] * s->w[0] + 0.0; /* its terms, one degree after the other */
+    double square = s->w[0] * s->w[0] + 0.0; /* Cauchy products give its terms, one degree after the other. */
     for (int n = 0; n <= ORDER; n++) {
         s->normal[n] = r->gravity * cosine[n] - square / r->rho;
         double force = stick * r->gravity * sine[n] + load * s->normal[n];
@@ -124,7 +122,7 @@ static void expand(const Ride *r, Series *s, double gauges[GAUGES][ORDER + 1]) {
     }
 }
 
-/* How long a step is, s: INFINITY for what rests. */
+/* Length of a step, s; INFINITY for a particle at rest. */
 static double step_of(const Ride *r, const Series *s) {
     double pace = fabs(r->w) + fabs(r->z) + fabs(r->belt) + sqrt(r->gravity * r->rho);
     double weight = r->gravity + r->w * r->w / r->rho, dt = INFINITY;
@@ -136,7 +134,7 @@ static double step_of(const Ride *r, const Series *s) {
     return dt;
 }
 
-/* When a gauge that is negative at `high` became so. */
+/* Time at which a gauge that is negative at `high` became negative. */
 static double turns_negative(const double *gauge, double low, double high) {
     for (int n = 0; n < HALVINGS; n++) {
         double middle = 0.5 * (low + high);
@@ -147,7 +145,7 @@ static double turns_negative(const double *gauge, double low, double high) {
     return high;
 }
 
-/* Ride round the pulley until it lifts off, at an angle (rad) and a speed (m/s); 0 if it never does. */
+/* Ride round the pulley until it lifts off; set the angle (rad) and the speed (m/s) there. Return 0 if it never does. */
 int ride_round(double *phi, double *w, double z, double rho, double gravity, double friction,
                double share, double belt) {
     Ride r = { *phi, *w, z, rho, gravity, friction, share, belt, 0.0, *phi - BACK };

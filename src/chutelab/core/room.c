@@ -1,11 +1,11 @@
-/* Where disks may be released, not in a surface that is there then, and where their tracks end. */
+/* Where disks can be released without overlapping a surface that exists then, and the boxes outside which tracks end. */
 
 #include "releases.h"
 
-/* Share of the largest coordinate by which a contact may seem to overlap: the engines see to it. */
+/* Share of the largest coordinate; a smaller overlap of a release is rounding, and is left to the engines. */
 #define ROUNDING (64.0 * 0x1p-52)
 
-/* A straight piece of a surface, a bent one, or neither: a pulley, which is solid. */
+/* A piece of a surface: a segment, an arc, or neither. Neither is a pulley, which is solid. */
 typedef struct {
     const Segment *segment;
     const Arc *arc;
@@ -34,7 +34,7 @@ static Piece straight_piece(const Segment *s) {
 }
 
 static Piece round_piece(const Arc *arc, double x, double y, double r, int surface) {
-    /* Rounding must not leave one out that just touches. */
+    /* Rounding must not exclude a piece that just touches. */
     double reach = r + ROUNDING * (MAX(fabs(x), fabs(y)) + r);
     return (Piece){
         0, arc, x, y, r, arc ? arc->appears : -INFINITY, arc ? arc->vanishes : INFINITY,
@@ -42,7 +42,7 @@ static Piece round_piece(const Arc *arc, double x, double y, double r, int surfa
     };
 }
 
-/* How many pieces there are: segments, arcs, the drive pulley, and those of the conveyors. */
+/* Number of pieces: segments, arcs, the drive pulley, and two pulleys for each conveyor. */
 static int piece_count(void) {
     return P.segment_count + P.arc_count + P.incoming + 2 * P.conveyors;
 }
@@ -53,12 +53,12 @@ static Piece piece_of(int k) {
     if (k < P.arc_count)
         return round_piece(arc, arc->center[0], arc->center[1], arc->radius, arc->surface);
     if ((k -= P.arc_count) < P.incoming) return round_piece(0, 0.0, 0.0, t->incoming->pulley_radius, 0);
-    /* The arcs of conveyors, two each, come before all others. */
+    /* The arcs of conveyors, two each, come before all other arcs. */
     arc = arcs + (k - P.incoming);
     return round_piece(0, arc->center[0], arc->center[1], arc->radius, arc->surface);
 }
 
-/* List the pieces that may reach into a box. */
+/* List the pieces whose boxes overlap a box. */
 static void list_pieces(double left, double bottom, double right, double top) {
     D.listed_count = 0;
     for (int k = 0; k < piece_count(); k++) {
@@ -68,7 +68,7 @@ static void list_pieces(double left, double bottom, double right, double top) {
     }
 }
 
-/* Whether a disk may reach a piece, or seem to. */
+/* Whether a disk may touch a piece, or seem to because of rounding. */
 static int is_beside(const Piece *p, double x, double y, double reach) {
     double room = reach + ON_BELT + ROUNDING * (fabs(x) + fabs(y));
     return p->box[2] > x - room && p->box[0] < x + room && p->box[3] > y - room
@@ -83,7 +83,8 @@ static void nearest_on_segment(const Segment *s, double x, double y, double *pla
     place[1] = y0 + share * dy;
 }
 
-/* An end of an arc from its centre, of the point: its digits are those of its coordinates. */
+/* An end of an arc, relative to its centre. It is rounded as its coordinates are, so that it is the point that others
+   share. */
 static void end_of_arc(const Arc *arc, double angle, double *end) {
     double dx, dy;
     sin_cos(angle, &dy, &dx);
@@ -108,7 +109,7 @@ static void nearest_on_arc(const Arc *arc, double x, double y, double *place) {
     place[1] = end[1] + arc->center[1];
 }
 
-/* The point of a piece that is nearest to a place; of a pulley its axis. */
+/* The point of a piece that is nearest to a place; for a pulley its axis. */
 static void nearest_point(const Piece *p, double x, double y, double *place) {
     place[0] = p->x;
     place[1] = p->y;
@@ -116,7 +117,8 @@ static void nearest_point(const Piece *p, double x, double y, double *place) {
     if (p->arc) nearest_on_arc(p->arc, x, y, place);
 }
 
-/* Mark places where a disk would be in a surface, whenever that is there; how many looks it took. */
+/* Mark places where a disk would overlap a surface, whether or not that exists at the time. Return how many pairs were
+   checked. */
 int take_what_is_in_surfaces(Place *places, int count, double radius) {
     double box[4] = { INFINITY, INFINITY, -INFINITY, -INFINITY }, point[2];
     for (const Place *o = places; o < places + count; o++) {
@@ -138,7 +140,7 @@ int take_what_is_in_surfaces(Place *places, int count, double radius) {
     return D.listed_count * count;
 }
 
-/* How far a box or polygon that is turned reaches towards (dx, dy), m: as far as its furthest corner. */
+/* How far a rotated box or polygon extends from its centroid in the direction (dx, dy), m: as far as its furthest corner. */
 static double reach_of_corners(const double *corners, int many, double angle, double dx, double dy) {
     double most = -INFINITY, sine, cosine;
     sin_cos(angle, &sine, &cosine);
@@ -147,17 +149,17 @@ static double reach_of_corners(const double *corners, int many, double angle, do
     return most;
 }
 
-/* Move a release out of a piece. One less than ON_BELT inside, as one written with ten digits may be, is
-   moved; another is a reason to refuse, and the deepest is told. */
+/* Move a release out of a piece. An overlap up to ON_BELT is moved, as ten written digits may cause it; a larger one is
+   refused, and the deepest is reported. */
 static void clear_release(const Piece *p, int stream, int i, double *deepest, Refusal *refusal) {
     Start *o = D.starts + (long)D.member * D.count + i;
     double x = o->position[0], y = o->position[1], reach = o->radius, point[2];
-    /* What moves is somewhere else by then: the engine has a release wait for it. */
+    /* A moving surface may be elsewhere then: the engine delays the release instead. */
     if (is_moved(t, p->surface)) return;
     if (!(p->appears <= o->t && o->t < p->vanishes) || !is_beside(p, x, y, o->radius)) return;
     nearest_point(p, x, y, point);
     double dx = x - point[0], dy = y - point[1], distance = length_of(dx, dy);
-    /* A point may start anywhere in a pulley. */
+    /* A mass point may start inside a pulley. */
     if (!p->segment && !p->arc) reach = reach > 0.0 ? p->radius + reach : 0.0;
     int kind = (int)t->streams[stream].kind, corners = (int)t->particles[kind].corners;
     if (corners) {
@@ -177,7 +179,7 @@ static void clear_release(const Piece *p, int stream, int i, double *deepest, Re
     o->position[1] = y + dy * (depth / distance);
 }
 
-/* List the pieces that releases of a member may be in. */
+/* List the pieces that releases of a member may overlap. */
 static void list_near_releases(void) {
     double box[4] = { INFINITY, INFINITY, -INFINITY, -INFINITY };
     const Start *o = D.starts + (long)D.member * D.count;
@@ -189,7 +191,8 @@ static void list_near_releases(void) {
     list_pieces(box[0], box[1], box[2], box[3]);
 }
 
-/* Move the releases of a member out of all pieces that are there then: 1 if that is done. */
+/* Move the releases of a member out of all pieces that exist then. Return 1 when done, 0 if the looks of this call are
+   used up. */
 int clear_releases(void) {
     Refusal *refusal = D.refusals + D.member;
     if (!D.is_begun) list_near_releases(), D.next = 0;
@@ -209,7 +212,7 @@ int clear_releases(void) {
     return 1;
 }
 
-/* The boxes beyond which particles have left the scene. */
+/* Boxes outside which a particle has left the scene. */
 
 static void hold(double *box, double x, double y) {
     box[0] = MIN(box[0], x);
@@ -224,7 +227,7 @@ static void hold_at(double *box, const Arc *arc, double angle) {
     hold(box, arc->center[0] + arc->radius * dx, arc->center[1] + arc->radius * dy);
 }
 
-/* The ends of an arc, and where it is level or upright. */
+/* Enlarge a box by the ends of an arc, and by its points where it is level or upright. */
 static void hold_arc(double *box, const Arc *arc) {
     for (int quarter = 0; quarter < 4; quarter++) {
         double way = modulo(0.5 * PI * quarter - arc->begin, 2.0 * PI);
@@ -234,8 +237,8 @@ static void hold_arc(double *box, const Arc *arc) {
     hold_at(box, arc, arc->begin + arc->extent);
 }
 
-/* How far a joint lets a particle go from what holds it, at most; a spring is taken to stretch to so many times
-   what it is. */
+/* How far a joint lets a particle move from its other end, at most. A spring is assumed to stretch to at most STRETCHES
+   times its length. */
 #define STRETCHES 3.0
 static int runs_over(const JointKeys *joint) {
     return joint->kind == STRING && !isnan(joint->other) && !isnan(joint->from[0]);
@@ -253,8 +256,8 @@ static double reach_of(const JointKeys *joint, const Start *first) {
     return joint->kind == SPRING ? STRETCHES * length : length;
 }
 
-/* All that joints let particles reach: from a fixed end, or from where they are released, by all of what may
-   lie between. */
+/* Enlarge a box by all places that joints let particles reach: round a fixed end by the length of the joint, else round
+   the release by twice the length of all joints together. */
 static void hold_joints(double *box, const Start *first) {
     double all = 0.0;
     for (int n = 0; n < P.joints; n++) all += reach_of(t->joints + n, first);
@@ -267,7 +270,7 @@ static void hold_joints(double *box, const Start *first) {
     }
 }
 
-/* Hold all that the pieces of a surface sweep, which are in a box before it moves. */
+/* Enlarge the box `all` by the region that a moving surface sweeps; `box` holds the surface before it moves. */
 static void hold_swept(double *all, double *box, const Mover *m) {
     double x = MAX(fabs(box[0] - m->pivot[0]), fabs(box[2] - m->pivot[0]));
     double y = MAX(fabs(box[1] - m->pivot[1]), fabs(box[3] - m->pivot[1])), reach = length_of(x, y);
@@ -285,12 +288,12 @@ static void hold_segment(double *box, const Segment *s) {
     hold(box, s->start[0] + s->length * s->tangent[0], s->start[1] + s->length * s->tangent[1]);
 }
 
-/* What pulls a particle to a side by less than this share of gravity is rounding. */
+/* If gravity pulls to a side with less than this share of g, that is rounding. */
 #define LEVEL 1e-9
 
-/* Give each particle of a member its box. With gravity it has the sides only to which that pulls. What
-   is released below all surfaces, or hangs on a string, has not left. Where particles do not meet, each
-   one's box holds its own release alone, so that it does the same alone and with others. */
+/* Set the exit box of each particle of a member. With gravity it has only those sides to which gravity pulls. It includes
+   the release, so a particle that is released below all surfaces or hangs on a string has not left. If particles do not
+   meet, each box includes only the particle's own release, so that it does the same alone as with others. */
 void box_in(void) {
     double all[4] = { INFINITY, INFINITY, -INFINITY, -INFINITY }, down[2];
     Start *first = D.starts + (long)D.member * D.count;

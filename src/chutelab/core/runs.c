@@ -1,17 +1,16 @@
-/* From a scene's numbers to an engine, in the core's memory: its machine is built, its releases are drawn,
-   and all is handed to the engine that is to run it. This is between the builder and the engines, and
-   knows of engines what layout.h says they are told. */
+/* Run a plan in the core's memory: build its machine, draw its releases, and hand both to an engine. This is between the
+   builder and the engines; of engines it uses only what layout.h describes. */
 
 #include <string.h>
 #include "plan.h"
 
-/* Particles and places that are looked at while releases are drawn: some 10 ms. What takes longer is left to
-   the host, which looks at its clock meanwhile. */
+/* Particles and places that may be checked while releases are drawn, some 10 ms. A drawing that takes longer is left to
+   the host, which watches the time. */
 #define LOOKS 1000000
-/* Distance from the world's origin, in machine sizes, from which on the host may count places from elsewhere:
-   it does so at twice as much, of a box that these places may not fill. */
+/* Distance from the world's origin, in machine sizes, beyond which the host may use a local origin: it does beyond twice
+   as much (REMOTE), measured by a box that may be larger than the one here. */
 #define FAR_OFF 4.0
-/* Friction without a bound, as a number that can be multiplied by zero. */
+/* Replaces infinite friction, which cannot be multiplied by zero. */
 #define GREATEST 1e300
 /* m/s2; gravity for which bounds on speeds are written. */
 #define EARTH 9.81
@@ -27,11 +26,11 @@ Drawing *drawing(void);
 int build(void);
 int draw(void);
 
-/* What a run needs beside the tables: see layout.h. */
+/* The terms of a run beside its tables: see layout.h. */
 static const RunKeys *run_keys;
 static const BodyKeys *bodies;
 static const Pair *pairs;
-static int own_pairs; /* of a kind: with each kind, then with each surface */
+static int own_pairs; /* number of pairs of a kind: with each kind, then with each surface */
 
 static void find_terms(void) {
     run_keys = (const RunKeys *)P.terms;
@@ -42,7 +41,7 @@ static void find_terms(void) {
 
 static const Pair *pair_with(int kind, int surface) { return pairs + kind * own_pairs + P.particles + surface; }
 
-/* Whether all is far from the world's origin. */
+/* Whether the whole machine is far from the world's origin. */
 static int is_far_off(void) {
     double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY }, size = 0.0;
     if (P.incoming) return 0;
@@ -62,7 +61,7 @@ static int is_far_off(void) {
     return fabs(low[0] + high[0]) > 2.0 * FAR_OFF * size || fabs(low[1] + high[1]) > 2.0 * FAR_OFF * size;
 }
 
-/* Build the machine and draw its releases: 1, or ASIDE; 0 if there is no memory. */
+/* Build the machine and draw its releases. Return 1, ASIDE if the host has to do it, 0 if there is no memory. */
 static int make_machine(void) {
     Drawing *d = drawing();
     if (!build()) return 0;
@@ -72,10 +71,10 @@ static int make_machine(void) {
     return is_sound && draw() == DONE && d->refusals->why == ACCEPTED ? 1 : ASIDE;
 }
 
-/* What `Start` and the tables say of a particle. */
+/* What `Start` and the tables say about a particle. */
 typedef struct { const Start *start; const BodyKeys *body; double mass, inertia; int kind, carried; } Released;
 
-/* Go to the next particle; streams follow each other. */
+/* The next particle; streams follow each other. Mass and inertia grow with the third and fifth power of its radius. */
 static Released released(const Tables *t, int i, int *stream, int *first) {
     const Start *start = drawing()->starts + i;
     while (i >= *first + (int)t->streams[*stream].count) *first += (int)t->streams[(*stream)++].count;
@@ -130,7 +129,7 @@ static int take_up_exact(void) {
     return 1;
 }
 
-/* Build what the plan says, and run it with the exact engine, see `follow_and_judge`; or ASIDE. */
+/* Build the plan and run it with the exact engine, see `follow_and_judge`. Return ASIDE if the host has to do it. */
 EXPORT int run_exact(void) {
     int made = make_machine();
     if (made == ASIDE) return ASIDE;

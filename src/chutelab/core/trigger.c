@@ -1,16 +1,16 @@
-/* Surfaces that come, go, or begin to move when another one is touched for the first time: by a blow that
-   ends the step, or as something comes to lie on it, at the end of that step. */
+/* Surfaces that appear, vanish or begin to move when another one is touched for the first time. If that is an impact, the
+   step ends at it; if something comes to lie on the surface, it happens at the end of that step. */
 
 #include "core.h"
 
-/* Whether a surface is to do something. */
+/* Whether a surface has a trigger for something it does (`enum Doing`). */
 int is_triggered(int owner, int doing) {
     for (const Trigger *g = W.triggers; g < W.triggers + W.trigger_count; g++)
         if (g->surface == owner && g->doing == doing) return 1;
     return 0;
 }
 
-/* Tell that a surface is touched at t. */
+/* Report that a surface is touched at t. */
 void touch(int owner, double t) {
     for (Trigger *g = W.triggers; g < W.triggers + W.trigger_count; g++) {
         if (g->by != owner || g->t < INFINITY) continue;

@@ -1,20 +1,19 @@
-/* Where a track is inside a surface, or passes one: found on the whole path, not at its knots only.
+/* Where a track overlaps a surface, or passes through one: checked along its whole path, not only at its knots.
 
-   Between two knots a track is a cubic with four control points. Its distance from the line of a
-   straight piece is a cubic too, the square of its distance from a centre one of degree 6: in
-   Bernstein's form neither is less than its least coefficient, nor more than its largest. So most
-   intervals are proven to be clear of a piece at once, all that are not are halved until they are,
-   or until they are short; what is left is measured. G. Farin, Curves and Surfaces for CAGD, ch. 5, 6.
+   Between two knots a track is a cubic with four control points. Its distance from the line of a straight piece is a
+   cubic too; the square of its distance from a centre is a polynomial of degree 6. In Bernstein form neither is below its
+   least coefficient or above its largest. So most intervals are proven to be clear of a piece at once. The others are
+   halved until they are clear or short; short ones are measured. G. Farin, Curves and Surfaces for CAGD, ch. 5, 6.
 
    A check shares nothing with what it checks: nothing here is from the engine's files. */
 
 #include "laws.h"
 
-/* A flight of 5 m is looked at every millimetre, where it has to be. */
+/* Halvings of an interval at most: a flight of 5 m is then checked every millimetre. */
 #define HALVINGS 12
-/* Places of each interval at which it is asked whether a particle has got clear of a gate. */
+/* Places of each interval at which the check for a particle that is clear of a gate is made. */
 #define GATED 64
-/* Share of its radius by which a particle near what moves goes at most from one look to the next. */
+/* Longest distance from one check to the next, in radii, for a particle near a moving piece. */
 #define STRIDE 0.05
 
 typedef struct { Two p[4]; } Curve;
@@ -22,19 +21,19 @@ typedef struct { Two p[4]; } Curve;
 /* Lower left and upper right corner. */
 typedef struct { Two low, high; } Box;
 
-/* An interval of a track beside a piece, while it is halved. */
+/* The interval of a track and the piece that are being checked. */
 static struct {
     Barrier *piece;
     int particle, number, knot; /* of the piece; of the knot before */
-    double radius, limit;       /* m; how near a centre may come, where it is not to be looked at ... */
+    double radius, limit;       /* m; how near the centre may come without a check ... */
     double reach;               /* m; of its corners, or its radius */
-    double begin, margin;       /* ... to begin with; how far a box may be from a piece that is met */
-    int deepest;                /* the hit of this interval that passes nothing, or -1 */
+    double begin, margin;       /* ... and that at the beginning; margin of boxes */
+    int deepest;                /* the hit of this interval that is no passage, or -1 */
 } At;
 
 static int is_cornered(void) { return L.outline_count && L.bodies[At.particle].corners; }
 
-/* Have the box of a piece hold a place. */
+/* Enlarge a box to include a place. */
 static void grow(double *box, double x, double y) {
     box[0] = MIN(box[0], x);
     box[1] = MIN(box[1], y);
@@ -48,20 +47,20 @@ PAIRED static int apart(const Box *a, const double *piece, double margin) {
     return is_any((a->low >= two_at(piece + 2) + margin) | (a->high <= two_at(piece) - margin));
 }
 
-/* What moves: it shakes, travels and turns about its pivot, see `Mover`. A piece is as written in its own
-   frame, into which places are taken. */
+/* Moving pieces: they shake, travel and turn about a pivot, see `Mover`. Places are transformed into the frame of the
+   piece, in which it is as written. */
 
-/* Furthest that a piece reaches from the pivot, by its box as written, m. */
+/* Greatest distance of a piece from its pivot, by its box as written, m. */
 static double reach_of(const Barrier *b, const Mover *m) {
     double x = MAX(fabs(b->box[0] - m->pivot[0]), fabs(b->box[2] - m->pivot[0]));
     double y = MAX(fabs(b->box[1] - m->pivot[1]), fabs(b->box[3] - m->pivot[1]));
     return hypot(x, y);
 }
 
-/* Whether states of a run tell where it is. */
+/* Whether its angle is recorded as states of the run: of a hinge, or turned by hand. */
 static int is_swung(const Mover *m) { return m->inertia > 0 || m->steered; }
 
-/* Have the box of a piece hold all that it sweeps. */
+/* Enlarge the box of a piece to all that it sweeps. */
 static void sweep(Barrier *b) {
     const Mover *m = L.movers + b->mover - 1;
     double reach = reach_of(b, m);
@@ -72,8 +71,8 @@ static void sweep(Barrier *b) {
     }
 }
 
-/* The largest speed of a point of a piece that moves, m/s, and its largest acceleration, m/s2; of a box that
-   holds what it sweeps. */
+/* Greatest speed of a point of a moving piece, m/s, and its greatest acceleration, m/s2. Bounds, since they use the box
+   that holds what the piece sweeps. */
 double swiftest(const Barrier *b, double *haste) {
     *haste = 0;
     if (!b->mover) return 0;
@@ -86,7 +85,7 @@ double swiftest(const Barrier *b, double *haste) {
     return rate * by + pace + turn * reach;
 }
 
-/* The angle of a hinge at t: between two of its states a cubic, as tracks are. */
+/* The angle of a hinge at t: between two of its states a cubic, like tracks. */
 static double swung_by(const Mover *m, double t) {
     const Swing *all = L.swings;
     int low = m->first, high = m->last;
@@ -100,7 +99,7 @@ static double swung_by(const Mover *m, double t) {
     return a->angle + s * (h * a->rate + s * ((3 * gone - h * (2 * a->rate + b->rate)) + s * (h * (a->rate + b->rate) - 2 * gone)));
 }
 
-/* Take a place at t into the frame of a piece. */
+/* Transform a place at t into the frame of a piece. */
 void to_rest(const Barrier *b, double t, double *x, double *y) {
     if (!b->mover) return;
     const Mover *m = L.movers + b->mover - 1;
@@ -116,9 +115,9 @@ void to_rest(const Barrier *b, double t, double *x, double *y) {
     *y = m->pivot[1] - s * dx + c * dy;
 }
 
-/* Pieces: where they are. */
+/* Places of pieces. */
 
-/* Whether a piece goes on at an end of the one before, of the same surface. */
+/* Whether a piece begins at an end of the piece before it, of the same surface. */
 static int follows(const Barrier *b) {
     const Barrier *last = b - 1;
     if (b->surface != last->surface || b->appears != last->appears || (b->radius > 0) != (last->radius > 0)) return 0;
@@ -170,19 +169,19 @@ static double foot(const Barrier *b, double x, double y) {
     return b->tx * (x - b->x) + b->ty * (y - b->y);
 }
 
-/* m along a bent piece, counterclockwise from its first end. */
+/* Distance along an arc, counterclockwise from its first end, m. */
 static double along(const Barrier *b, double x, double y) {
     double turn = fmod(atan2(y - b->y, x - b->x) - b->begin, 2 * PI);
     return b->radius * (turn < 0 ? turn + 2 * PI : turn);
 }
 
-/* Distance from the line of a piece, the side on the left or outside positive, m. */
+/* Distance from the line or circle of a piece, m; positive on the left, or outside. */
 double beside(const Barrier *b, double x, double y) {
     if (b->radius == 0) return b->tx * (y - b->y) - b->ty * (x - b->x);
     return hypot(x - b->x, y - b->y) - b->radius;
 }
 
-/* Whether a place is beside a piece, and not beyond its ends, each `margin` (m) inside of what it is. */
+/* Whether the foot of a place is on the piece, more than `margin` (m) from its ends. */
 int is_within(const Barrier *b, double x, double y, double margin) {
     if (b->radius > 0 && b->whole) return 1;
     double way = b->radius == 0 ? foot(b, x, y) : along(b, x, y);
@@ -200,7 +199,7 @@ double distance(const Barrier *b, double x, double y) {
     return MIN(hypot(x - b->end[0], y - b->end[1]), hypot(x - b->end[2], y - b->end[3]));
 }
 
-/* The same, from the straight way on beyond its ends, m. */
+/* `beside`, but beyond the ends of an arc the distance from the tangent there, m. */
 static double aside(const Barrier *b, double x, double y) {
     if (b->radius == 0 || b->whole || along(b, x, y) <= b->extent * b->radius) return beside(b, x, y);
     int last = hypot(x - b->end[0], y - b->end[1]) > hypot(x - b->end[2], y - b->end[3]);
@@ -208,8 +207,8 @@ static double aside(const Barrier *b, double x, double y) {
     return ((x - end[0]) * (end[0] - b->x) + (y - end[1]) * (end[1] - b->y)) / b->radius;
 }
 
-/* The nearest of pieces that follow each other and are solid from one side, or the one that moves: its distance, and how
-   far a place is on its solid side, or on its left, m. At a corner the sum of the two counts. */
+/* The nearest piece of a one-sided chain, or the moving piece: its distance, and how far the place is on its solid side
+   (or on its left), m. At a corner, where two are equally near, the sum of both counts. */
 static const Barrier *nearest(const Barrier *b, double x, double y, double *gap, double *off) {
     const Barrier *found = b;
     *gap = INFINITY;
@@ -239,7 +238,7 @@ PAIRED static Two place_on(const Curve *c, double share) {
     return r * r * (r * c->p[0] + 3 * s * c->p[1]) + s * s * (3 * r * c->p[2] + s * c->p[3]);
 }
 
-/* Where a particle is at a share of the interval after a knot. */
+/* Position at a share of the interval after a knot. */
 PAIRED void place_at(const double *knot, double share, double *x, double *y) {
     Curve c = curve_after(knot);
     Two place = place_on(&c, share);
@@ -247,12 +246,12 @@ PAIRED void place_at(const double *knot, double share, double *x, double *y) {
     *y = place[1];
 }
 
-/* The sums of each of two pairs. */
+/* The sum of each of two pairs. */
 PAIRED static Two sums(Two a, Two b) {
     return __builtin_shufflevector(a, b, 0, 2) + __builtin_shufflevector(a, b, 1, 3);
 }
 
-/* Coefficients of the square of the distance from a place, m2; the last of seven is there twice. */
+/* Bernstein coefficients of the square of the distance from a place, m2; the last of the seven is there twice. */
 PAIRED static void square_distance(const Curve *c, Two place, Two *q) {
     Two a = c->p[0] - place, b = c->p[1] - place, d = c->p[2] - place, e = c->p[3] - place, last = e * e;
     q[0] = sums(a * a, a * b);
@@ -261,7 +260,7 @@ PAIRED static void square_distance(const Curve *c, Two place, Two *q) {
     q[3] = sums(last, last);
 }
 
-/* Whether none of some pairs of coefficients is less, or none more, than a bound. */
+/* Whether all coefficients are at least, or at most, a bound. */
 PAIRED static int all_from(const Two *a, int n, double bound) {
     Truth yes = a[0] >= bound;
     for (int k = 1; k < n; k++) yes &= a[k] >= bound;
@@ -274,14 +273,14 @@ PAIRED static int all_to(const Two *a, int n, double bound) {
     return is_all(yes);
 }
 
-/* Products with a vector of the ways from a place to the control points. */
+/* Scalar products of a vector with the vectors from a place to the control points. */
 PAIRED static void along_vector(const Curve *c, Two place, Two vector, Two *found) {
     found[0] = sums((c->p[0] - place) * vector, (c->p[1] - place) * vector);
     found[1] = sums((c->p[2] - place) * vector, (c->p[3] - place) * vector);
 }
 
-/* Whether a path that is beyond an end, by rounding not quite, is clear of the piece: from where that is met
-   to the end it is no more than rounding. */
+/* Whether a path beyond an end is clear of it. Rounding may put the foot a little before the end; the limit allows for
+   that. */
 PAIRED static int is_clear_of_end(const Curve *c, const double *end, double limit) {
     double reach = MAX(limit + L.rounding, 0);
     Two q[4];
@@ -300,36 +299,37 @@ PAIRED static int is_clear_of_line(const Curve *c, const Barrier *b, double limi
     return all_from(feet, 2, b->length - L.rounding) && is_clear_of_end(c, b->end + 2, limit);
 }
 
-/* Whether all of a path is left of the ray from the centre through an end, or right of it, but for rounding:
-   by no more than that along the arc where a particle inside can touch it. */
+/* Whether a whole path is left of the ray from the centre through an end (side = 1), or right of it (-1), within
+   rounding: along the arc, where a particle inside can touch it, that is at most the rounding. */
 PAIRED static int is_aside(const Curve *c, const Barrier *b, const double *end, double side) {
     Two center = two_at(&b->x), out = side * (two_at(end) - center), beyond[2];
     along_vector(c, center, (Two){ -out[1], out[0] }, beyond);
     return all_from(beyond, 2, -L.rounding * MAX(b->radius - At.radius, 0));
 }
 
-PAIRED static int is_clear_of_bow(const Curve *c, const Barrier *b, double limit) {
+PAIRED static int is_clear_of_arc(const Curve *c, const Barrier *b, double limit) {
     double outer = b->radius + limit, inner = b->radius - limit;
     Two q[4];
     square_distance(c, two_at(&b->x), q);
-    /* Of a mass point both may hold to begin with: then the limit is below 0. */
+    /* For a mass point the limit is below 0 at first, so both may hold. */
     if (all_from(q, 4, outer * outer) || (inner > 0 && all_to(q, 4, inner * inner))) return 1;
     if (b->whole) return 0;
-    /* Beyond the ends: not counterclockwise of the first, or not clockwise of the last; of an arc of
-       more than half a circle neither. */
+    /* Beyond the ends: not counterclockwise of the first end, or not clockwise of the last one; both for an arc of more
+       than half a circle. */
     int not_after = is_aside(c, b, b->end, -1), not_before = is_aside(c, b, b->end + 2, 1);
     int off = b->extent > PI ? not_after && not_before : not_after || not_before;
     return off && is_clear_of_end(c, b->end, limit) && is_clear_of_end(c, b->end + 2, limit);
 }
 
 PAIRED static int is_clear(const Curve *c, const Barrier *b, double limit) {
-    return b->radius == 0 ? is_clear_of_line(c, b, limit) : is_clear_of_bow(c, b, limit);
+    return b->radius == 0 ? is_clear_of_line(c, b, limit) : is_clear_of_arc(c, b, limit);
 }
 
-/* What has corners. */
+/* Particles with corners. */
 
-/* Have the corners of a particle be where they are at a share of the interval after a knot, as the centre is told, in
-   the frame of a piece: between knots a spin is even, but for what turning leaves. Return how many. */
+/* Set the corners of a particle at a share of the interval after a knot, with its centre at (x, y), in the frame of a
+   piece. Return how many. Between knots the spin changes at a constant rate; the remaining difference of the angle is
+   spread evenly. */
 static int corners_at(int knot, double share, double x, double y, const Barrier *b, double (*p)[2]) {
     const Body *body = L.bodies + At.particle;
     const double *now = KNOT(knot), *next = now + L.row;
@@ -346,8 +346,8 @@ static int corners_at(int knot, double share, double x, double y, const Barrier 
     return body->corners;
 }
 
-/* How far the corner of an edge that is beyond an arc, or the edge itself, is beyond it, m; 0 if it does not cross it, but
-   where an end may be in the edge. */
+/* How far an edge of a particle, or a corner at its end, is on the other side of an arc, m. 0 if the edge doesn't cross
+   the arc, except where an end of the arc may be inside the edge. */
 static double across(const Barrier *b, const double *q, const double *r, int inside) {
     double x = q[0] - b->x, y = q[1] - b->y, ex = r[0] - q[0], ey = r[1] - q[1];
     double a = ex * ex + ey * ey, half = x * ex + y * ey, root = half * half - a * (x * x + y * y - b->radius * b->radius);
@@ -364,8 +364,9 @@ static double across(const Barrier *b, const double *q, const double *r, int ins
     return inside ? MAX(one, other) : MAX(-one, -other);
 }
 
-/* How deep a polygon, whose centre is at a place, is in a piece, m: of a straight one along the best of all edges, below
-   0 if it is clear. Of a bent one what of it is on the other side, or how deep an end is in it, if that is less; else 0. */
+/* How deep a polygon with its centre at (x, y) is in a piece, m. For a straight piece the least overlap over all
+   separating axes, below 0 if it is clear. For an arc how far the polygon is on the other side, or how deep an end of the
+   arc is in it, if that is less; else 0. */
 static double deep_in(const Barrier *b, double (*p)[2], int count, double x, double y) {
     double clear = -INFINITY, low = INFINITY, high = -INFINITY, far = 0, ends[2] = {INFINITY, INFINITY};
     int inside = hypot(x - b->x, y - b->y) < b->radius;
@@ -402,7 +403,7 @@ static Hit *add_hit(double t, double x, double y, double depth, int passes) {
     return hit;
 }
 
-/* From when on nothing is forgiven to a particle in a gate that shut on it: it is clear of it then. */
+/* Time from which a particle on which a gate has closed is clear of it; overlaps count from then on. */
 static double clear_from(void) {
     const Barrier *b = At.piece;
     for (int k = L.offsets[At.particle]; k < L.offsets[At.particle + 1] - 1; k++) {
@@ -418,8 +419,8 @@ static double clear_from(void) {
     return INFINITY;
 }
 
-/* How deep a particle may be in a piece as it began there, m: as deep as it was at its release; and
-   without bound in a gate that shut on it, as long as it has not been clear of it since. */
+/* How deep a particle may be in a piece because it began there, m: as deep as at its release; without bound in a gate
+   that closed on it, until it is clear of the gate. */
 static double forgiven(double t) {
     const double *first = KNOT(L.offsets[At.particle]);
     int gate = At.piece->appears > first[0];
@@ -428,13 +429,13 @@ static double forgiven(double t) {
     return t > At.piece->clear ? 0 : INFINITY;
 }
 
-/* From now on only places of this interval that are deeper than that, and passages, are looked for: what
-   has come to the very middle of a piece may still pass it. */
-static void ask_for(double depth) {
+/* From now on, search this interval only for deeper places and for passages: a centre that is on the piece may still pass
+   it. */
+static void look_deeper_than(double depth) {
     if (At.radius > 0) At.limit = MAX(At.radius - depth, L.rounding);
 }
 
-/* What is left of an interval: note it if it is bad. */
+/* Measure an interval that is as short as it gets: add a hit if it is a breach. */
 PAIRED static void measure(const Curve *c, double begin, double size) {
     const Barrier *b = At.piece;
     double deep[2], x[2] = { c->p[0][0], c->p[3][0] }, y[2] = { c->p[0][1], c->p[3][1] };
@@ -450,9 +451,9 @@ PAIRED static void measure(const Curve *c, double begin, double size) {
     double spared = forgiven(t);
     if (!((passes && spared < INFINITY) || deep[at] > spared + L.allowed)) return;
     double depth = deep[at] - MIN(spared, At.radius);
-    if (!passes) ask_for(deep[at] + L.rounding);
+    if (!passes) look_deeper_than(deep[at] + L.rounding);
     if (passes) {
-        /* Each passage counts, and of all the rest of an interval the deepest place. */
+        /* Each passage counts; of the other places of an interval only the deepest. */
         add_hit(t, x[at], y[at], depth, 1);
     } else if (At.deepest < 0) {
         At.deepest = L.hit_count;
@@ -473,7 +474,7 @@ PAIRED static void halve(const Two *a, Two *first, Two *last) {
     first[3] = last[0] = 0.5 * (first[2] + last[1]);
 }
 
-PAIRED static void settle(const Curve *c, double begin, double size, int halvings) {
+PAIRED static void halve_until_clear(const Curve *c, double begin, double size, int halvings) {
     if (is_clear(c, At.piece, At.limit)) return;
     if (halvings == HALVINGS) {
         measure(c, begin, size);
@@ -481,14 +482,15 @@ PAIRED static void settle(const Curve *c, double begin, double size, int halving
     }
     Curve first, last;
     halve(c->p, first.p, last.p);
-    settle(&first, begin, 0.5 * size, halvings + 1);
-    settle(&last, begin + 0.5 * size, 0.5 * size, halvings + 1);
+    halve_until_clear(&first, begin, 0.5 * size, halvings + 1);
+    halve_until_clear(&last, begin + 0.5 * size, 0.5 * size, halvings + 1);
 }
 
-/* Look at an interval beside one piece that its box is not clear of. */
-PAIRED static void look(const Curve *c, Barrier *b, int number, int knot) {
+/* Check an interval beside a piece whose box it overlaps. */
+PAIRED static void check_interval(const Curve *c, Barrier *b, int number, int knot) {
     if (is_clear(c, b, At.begin)) return;
-    /* On a rim the coefficients of a long interval are less than the path ever is, of its halves hardly. */
+    /* On the rim of a circle, the coefficients of a long interval are below the real distance; those of its halves hardly
+       are. */
     Curve half, rest;
     halve(c->p, half.p, rest.p);
     if (is_clear(&half, b, At.begin) && is_clear(&rest, b, At.begin)) return;
@@ -500,19 +502,19 @@ PAIRED static void look(const Curve *c, Barrier *b, int number, int knot) {
     double t = KNOT(knot)[0], next = KNOT(knot + 1)[0];
     if (next < b->appears + L.dt || t > b->vanishes) return;
     if (L.pulley && number == 0) {
-        /* The incoming belt ends on the pulley: beyond it that is what is near. */
+        /* The incoming belt ends on the pulley: beyond that end the pulley is near, not the belt. */
         Two feet[2];
         along_vector(c, two_at(&b->x), two_at(&b->tx), feet);
         if (all_from(feet, 2, b->length)) return;
     }
     double spared = forgiven(next);
     if (spared == INFINITY) return;
-    ask_for(L.allowed + spared);
-    settle(c, 0, 1, 0);
+    look_deeper_than(L.allowed + spared);
+    halve_until_clear(c, 0, 1, 0);
 }
 
-/* Side of a piece on which a path is where it first is off it, from its beginning on or back from its end:
-   1 or -1, or 0 if it stays on it, or gets beyond its ends. */
+/* The side of a piece on which a path first leaves it, followed from its beginning or back from its end: 1 or -1; 0 if it
+   stays on the piece or passes its ends. */
 PAIRED static int side_of(const Barrier *b, const Curve *c, int is_end) {
     for (double share = 1.0 / (1 << HALVINGS); share <= 1; share *= 2) {
         Two place = place_on(c, is_end ? 1 - share : share);
@@ -523,9 +525,9 @@ PAIRED static int side_of(const Barrier *b, const Curve *c, int is_end) {
     return 0;
 }
 
-/* Where a mass point comes to a piece from one side and goes on on the other: such a passage at a knot,
-   as where a blow does not turn a point back, is in no interval. */
-PAIRED static void turn(const Curve *before, const Curve *after, const Barrier *pieces, int knot) {
+/* Add a hit where a mass point reaches a piece at a knot from one side and continues on the other: if an impact doesn't
+   turn a point back, no interval contains the passage. */
+PAIRED static void check_knot(const Curve *before, const Curve *after, const Barrier *pieces, int knot) {
     const double *now = KNOT(knot);
     for (int k = 0; k < L.piece_count; k++) {
         const Barrier *b = pieces + k;
@@ -536,11 +538,11 @@ PAIRED static void turn(const Curve *before, const Curve *after, const Barrier *
     }
 }
 
-/* An interval of a track: its path, and the box about that. */
+/* An interval of a track: its path, and the box round it. */
 typedef struct { Curve path; Box box; int knot; } Interval;
 
-/* Look at some intervals that follow each other, in a common box. */
-PAIRED static void look_at_all(const Interval *some, int count, const Box *box, Barrier *pieces) {
+/* Check consecutive intervals, first by their common box. */
+PAIRED static void check_intervals(const Interval *some, int count, const Box *box, Barrier *pieces) {
     int near = 0;
     for (int k = 0; k < L.piece_count; k++) {
         if (!pieces[k].mover && !pieces[k].one_sided && !apart(box, pieces[k].box, At.margin)) pieces[near++].near = k;
@@ -548,15 +550,15 @@ PAIRED static void look_at_all(const Interval *some, int count, const Box *box, 
     for (int k = 0; k < near; k++) {
         Barrier *b = pieces + pieces[k].near;
         for (const Interval *now = some; now < some + count; now++) {
-            if (!apart(&now->box, b->box, At.margin)) look(&now->path, b, pieces[k].near, now->knot);
+            if (!apart(&now->box, b->box, At.margin)) check_interval(&now->path, b, pieces[k].near, now->knot);
         }
     }
 }
 
-/* Look at an interval of a track beside a piece that moves, or a chain that is solid from one side, in strides in which
-   the particle cannot come too near, or in which both go by a share of its radius. `spared` is how deep it may be:
-   on the side that lets it through as deep as it is, and until it is clear of it, by more than is allowed, on the other. */
-PAIRED static void look_at_moving(const Interval *now, Barrier *b, int number, double *spared) {
+/* Check an interval of a track beside a moving piece or a one-sided chain, in steps in which the particle cannot come too
+   near, or in which both move by STRIDE radii at most. `spared` is how deep the particle may be: on the side that lets it
+   pass as deep as it is, then on the other side, until it is clear, deeper than is allowed. */
+PAIRED static void check_beside_moving(const Interval *now, Barrier *b, int number, double *spared) {
     const double *knot = KNOT(now->knot);
     const Two *p = now->path.p;
     double h = knot[L.row] - knot[0], way = 0, haste, share = 0, before = 0, corners[MOST_CORNERS][2];
@@ -596,8 +598,8 @@ PAIRED static void look_at_moving(const Interval *now, Barrier *b, int number, d
     }
 }
 
-/* Look at all of a track beside what moves, or is solid from one side, and of what has corners beside all. */
-PAIRED static void look_at_movers(int i, Barrier *pieces) {
+/* Check a whole track beside moving and one-sided pieces, and for a particle with corners beside all pieces. */
+PAIRED static void check_moving_pieces(int i, Barrier *pieces) {
     for (int k = 0; k < L.piece_count; k++) {
         double spared = NAN;
         if (pieces[k].one_sided ? !pieces[k].chain : !(pieces[k].mover || is_cornered())) continue;
@@ -609,14 +611,14 @@ PAIRED static void look_at_movers(int i, Barrier *pieces) {
             int away = 1;
             for (int m = 0; m < MAX(pieces[k].chain, 1); m++) away &= apart(&now.box, pieces[k + m].box, At.reach);
             if (KNOT(n)[0] == KNOT(n)[L.row] || away) continue;
-            look_at_moving(&now, pieces + k, k, &spared);
+            check_beside_moving(&now, pieces + k, k, &spared);
         }
     }
 }
 
-/* Find where a particle is deeper in surfaces than is allowed, or passes them: one place, or each passage,
-   for each interval beside each piece; return whether there is any. What stood in the way of a gate as it
-   shut is spared until it is clear of it; what overlapped at its release may go on doing so, no deeper. */
+/* Find where a particle overlaps surfaces by more than is allowed, or passes through them: the deepest place, and each
+   passage, for each interval beside each piece. Return whether there is any. A particle on which a gate closed is exempt
+   until it is clear of it; an overlap at the release may remain, but not grow. */
 PAIRED int find_hits(int i) {
     Interval some[WIDTH];
     Barrier *pieces = L.barriers + member_of(i) * L.piece_count;
@@ -642,17 +644,17 @@ PAIRED int find_hits(int i) {
         box.low = lesser(box.low, now->box.low);
         box.high = larger(box.high, now->box.high);
         if (At.radius == 0) {
-            if (!first) turn(&last, &now->path, pieces, k);
+            if (!first) check_knot(&last, &now->path, pieces, k);
             last = now->path;
             first = 0;
         }
         if (count == WIDTH) {
-            look_at_all(some, count, &box, pieces);
+            check_intervals(some, count, &box, pieces);
             box = all_apart();
             count = 0;
         }
     }
-    look_at_all(some, count, &box, pieces);
-    look_at_movers(i, pieces);
+    check_intervals(some, count, &box, pieces);
+    check_moving_pieces(i, pieces);
     return L.hit_count > before;
 }

@@ -1,4 +1,4 @@
-/* What surfaces bear in the contact engine: of blows, of contacts that last, under what sleeps and rides. */
+/* Loads on surfaces in the contact engine: from impacts, lasting contacts, sleepers and riders. */
 
 #include "core.h"
 
@@ -7,20 +7,20 @@ static Push at_foot(const Disk *d, int owner, double depth, double nx, double ny
                    .nx = nx, .ny = ny };
 }
 
-/* The same below a rider, on the belt. */
+/* The same for the belt below a rider. */
 static Push on_belt(const Disk *d, double from, double to) {
     double phi = MAX(d->ride_x + d->ride_speed * (0.5 * (from + to) - d->ride_from), 0) / d->ride_rho - W.ride_incline;
     double depth = d->ride_rho - (W.pulley < 0 ? 0 : W.surfaces[W.pulley].radius);
     return at_foot(d, W.ride_owner, depth, sin(phi), cos(phi), from, to);
 }
 
-/* The impulse on disk i of a contact, N s. */
+/* The impulse of a contact on disk i, N s. */
 static void impulse_of(const Contact *c, double share, double *J) {
     J[0] = share * (pressed(c) * c->nx + c->impulse[1] * c->ny);
     J[1] = share * (pressed(c) * c->ny - c->impulse[1] * c->nx);
 }
 
-/* Tell of the impulse on disk i of a contact with a surface, or with a rider, whose belt bears it. */
+/* Report the load by a contact of disk i with a surface, or with a rider: then the belt of the rider bears it. */
 void bear_contact(const Contact *c, double share, double from, double to) {
     const Disk *a = W.disks + c->i;
     double J[2];
@@ -38,13 +38,13 @@ void bear_contact(const Contact *c, double share, double from, double to) {
     bear(&p);
 }
 
-/* Keep what surfaces gave by a push, from the foot below a disk. */
+/* Record the impulse of a surface on a disk, from its foot on the surface. */
 static void keep_push(const Disk *d, const Push *p, double depth) {
     double J[] = {p->jx, p->jy}, b[] = {depth * p->nx, depth * p->ny};
     keep_contact((int)(d - W.disks), -1 - p->owner, p->from, p->to, J, b);
 }
 
-/* What disk i of a contact is off the other, or off its foot on a surface, m. */
+/* The vector to the centre of disk i from that of its partner, or from its foot on a surface, m. */
 static void branch_of(const Contact *c, double *b) {
     const Disk *a = W.disks + c->i, *other = W.disks + MAX(c->j, 0);
     b[0] = c->j < 0 ? a->radius * c->nx : a->x - other->x;
@@ -56,7 +56,7 @@ static void branch_of(const Contact *c, double *b) {
 
 static int other_of(const Contact *c) { return c->j < 0 ? -1 - c->owner : c->j; }
 
-/* The same, kept pair by pair. Blows are events instead. */
+/* Record the impulse of a lasting contact for its pair. Impacts are events instead. */
 void keep_impulse(const Contact *c, double share, double from, double to) {
     double J[2], b[2];
     if (B.each == 0) return;
@@ -66,7 +66,7 @@ void keep_impulse(const Contact *c, double share, double from, double to) {
     keep_carried(c, share, from, to);
 }
 
-/* What a contact takes from a rider its belt gives it, of a blow too: the rider's way stays as it is. */
+/* Record that the belt gives a rider what a contact takes from it, also in an impact, as its path doesn't change. */
 void keep_carried(const Contact *c, double share, double from, double to) {
     double J[2];
     if (B.each == 0 || c->j < 0 || c->two) return;
@@ -77,14 +77,14 @@ void keep_carried(const Contact *c, double share, double from, double to) {
     keep_push(W.disks + c->j, &p, W.disks[c->j].radius);
 }
 
-/* How far the foot of a disk on a surface is from its centre, m, and the normal there. What has corners is borne
-   below its centre, as far as that is told. */
+/* Distance of the foot of a disk on a surface from its centre, m, and the normal there. The place at which a particle
+   with corners is supported isn't known here: its foot is taken below its centre. */
 static double depth_of(const Disk *d, const Surface *s, double *nx, double *ny) {
     double gap = gap_to(s, d->x, d->y, d->radius, nx, ny);
     return has_corners(d) ? gap + d->radius : d->radius;
 }
 
-/* Tell of an impulse on a disk that the surface which it lies on, or one that bears its island, gives. */
+/* Report an impulse on a disk from the surface that it lies on, or that supports its island. */
 void bear_disk(const Disk *d, int owner, double jx, double jy, double from, double to) {
     double nx = 0, ny = 1, depth = d->radius;
     if ((B.every == 0 && B.each == 0) || (jx == 0 && jy == 0)) return;
@@ -97,8 +97,8 @@ void bear_disk(const Disk *d, int owner, double jx, double jy, double from, doub
     if (B.each > 0) keep_push(d, &p, depth);
 }
 
-/* Tell of a ride since the last knot, up to where the disk is now: the belt gives what changes its
-   velocity and what gravity would. */
+/* Report the load by a ride since the last knot, up to the present place: the belt gives the change of the velocity and
+   what gravity takes. */
 void bear_ride(int i) {
     const Disk *d = W.disks + i;
     const double *last = W.tracks[i].knot;
@@ -115,14 +115,14 @@ void bear_ride(int i) {
     if (B.each > 0) keep_push(d, &p, d->radius);
 }
 
-/* Note the force by which a surface that is pressed bore a disk in a step; it is the last of `held`. */
+/* Note the force with which the last surface of `held` supported a disk in a step. */
 void note_force(Disk *d, const Contact *c, double span) {
     double *force = d->bears + 2 * (d->held_count - 1);
     force[0] = (pressed(c) * c->nx + c->impulse[1] * c->ny) / span;
     force[1] = (pressed(c) * c->ny - c->impulse[1] * c->nx) / span;
 }
 
-/* Tell of what surfaces gave a sleeper since it fell asleep, and for some time more at the end. */
+/* Report the loads by a sleeper since it fell asleep, and for the time `more` at the end. */
 void bear_asleep(const Disk *d, double until, double more) {
     if (B.each > 0) keep_awake((int)(d - W.disks), until, until - d->slept + more);
     for (int n = 0; n < d->held_count && B.every > 0; n++) {
@@ -140,8 +140,8 @@ void bear_asleep(const Disk *d, double until, double more) {
     }
 }
 
-/* Islands that have just fallen asleep are borne by their weight: what the forces of the latest step are off
-   it, a solve's rest, goes to all of them in proportion. `W.queue` leads to islands. */
+/* Correct the forces on islands that have just fallen asleep so that they bear the weight: the difference, an error of
+   the solve, is distributed over all forces in proportion to their size. `W.queue` leads to the roots of islands. */
 void balance_sleepers(void) {
     for (int i = W.low; i < W.high && B.every > 0; i++) {
         if (W.disks[i].mode != ASLEEP || W.disks[i].slept != W.t || island_of(i) != i) continue;
@@ -160,71 +160,71 @@ void balance_sleepers(void) {
     }
 }
 
-/* Rounds of conjugate gradients, and the share of weight that they may leave. */
+/* Greatest number of rounds of conjugate gradients, and the share of the weight that they may leave unbalanced. */
 #define ROUNDS 200
 #define BALANCED 1e-12
 
-enum { LEFT, AHEAD, CHANGE, RAISED };
+enum { RESIDUAL, DIRECTION, SOLUTION, PRODUCT };
 
-/* One of the four vectors of a disk. */
-static double *of(int disk, int which) { return B.balance + 8 * disk + 2 * which; }
+/* One of the four vectors of conjugate gradients, at a disk. */
+static double *vector_of(int disk, int which) { return B.balance + 8 * disk + 2 * which; }
 
-/* Raise each contact's force on its disk by how much more of `which` the disk has than the other, and add up at
-   disks what that gives into `to`. */
-static void add_raised(const Lasting *rows, int count, int which, int to) {
+/* Multiply a vector by the Laplacian of the net of contacts, and add the product to another one. */
+static void multiply(const Lasting *rows, int count, int which, int to) {
     for (const Lasting *c = rows; c < rows + count; c++)
         for (int n = 0; n < 2; n++) {
-            double more = of(c->disk, which)[n] - (c->other < 0 ? 0 : of(c->other, which)[n]);
-            of(c->disk, to)[n] += more;
-            if (c->other >= 0) of(c->other, to)[n] -= more;
+            double more = vector_of(c->disk, which)[n] - (c->other < 0 ? 0 : vector_of(c->other, which)[n]);
+            vector_of(c->disk, to)[n] += more;
+            if (c->other >= 0) vector_of(c->other, to)[n] -= more;
         }
 }
 
-/* Change the forces of contacts by the least that has them bear the weight of all sleepers: what the forces of the
-   latest step are off it is a solve's rest. The change is a difference of what disks have, a potential, whose
-   Laplacian on the net of contacts is what weight lacks. */
+/* Change the forces of contacts as little as possible so that they bear the weight of all sleepers; what they miss is the
+   error of the solve. The change of a force is the difference of a potential at its two disks, and the Laplacian of the
+   potential on the net of contacts is the missing weight. Conjugate gradients find the potential. */
 static void balance_contacts(Lasting *rows, int count) {
     double size = 0, weight = 0;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         int sleeps = d->mode == ASLEEP && d->slept == W.t;
-        for (int n = 0; n < 8; n++) of(i, 0)[n] = 0;
-        of(i, LEFT)[0] = sleeps ? -d->mass * W.gx : 0;
-        of(i, LEFT)[1] = sleeps ? -d->mass * W.gy : 0;
-        for (int n = 0; n < 2; n++) weight += square(of(i, LEFT)[n]);
+        for (int n = 0; n < 8; n++) vector_of(i, 0)[n] = 0;
+        vector_of(i, RESIDUAL)[0] = sleeps ? -d->mass * W.gx : 0;
+        vector_of(i, RESIDUAL)[1] = sleeps ? -d->mass * W.gy : 0;
+        for (int n = 0; n < 2; n++) weight += square(vector_of(i, RESIDUAL)[n]);
     }
     for (const Lasting *c = rows; c < rows + count; c++)
         for (int n = 0; n < 2; n++) {
-            of(c->disk, LEFT)[n] -= (&c->x)[n];
-            if (c->other >= 0) of(c->other, LEFT)[n] += (&c->x)[n];
+            vector_of(c->disk, RESIDUAL)[n] -= (&c->x)[n];
+            if (c->other >= 0) vector_of(c->other, RESIDUAL)[n] += (&c->x)[n];
         }
     for (int i = W.low; i < W.high; i++)
         for (int n = 0; n < 2; n++) {
-            of(i, AHEAD)[n] = of(i, LEFT)[n];
-            size += square(of(i, LEFT)[n]);
+            vector_of(i, DIRECTION)[n] = vector_of(i, RESIDUAL)[n];
+            size += square(vector_of(i, RESIDUAL)[n]);
         }
     for (int round = 0; round < ROUNDS && size > square(BALANCED) * weight; round++) {
         double along = 0, now = 0;
-        for (int i = W.low; i < W.high; i++) of(i, RAISED)[0] = of(i, RAISED)[1] = 0;
-        add_raised(rows, count, AHEAD, RAISED);
+        for (int i = W.low; i < W.high; i++) vector_of(i, PRODUCT)[0] = vector_of(i, PRODUCT)[1] = 0;
+        multiply(rows, count, DIRECTION, PRODUCT);
         for (int i = W.low; i < W.high; i++)
-            for (int n = 0; n < 2; n++) along += of(i, AHEAD)[n] * of(i, RAISED)[n];
+            for (int n = 0; n < 2; n++) along += vector_of(i, DIRECTION)[n] * vector_of(i, PRODUCT)[n];
         if (!(along > 0)) break;
         for (int i = W.low; i < W.high; i++)
             for (int n = 0; n < 2; n++) {
-                of(i, CHANGE)[n] += size / along * of(i, AHEAD)[n];
-                of(i, LEFT)[n] -= size / along * of(i, RAISED)[n];
-                now += square(of(i, LEFT)[n]);
+                vector_of(i, SOLUTION)[n] += size / along * vector_of(i, DIRECTION)[n];
+                vector_of(i, RESIDUAL)[n] -= size / along * vector_of(i, PRODUCT)[n];
+                now += square(vector_of(i, RESIDUAL)[n]);
             }
         for (int i = W.low; i < W.high; i++)
-            for (int n = 0; n < 2; n++) of(i, AHEAD)[n] = of(i, LEFT)[n] + now / size * of(i, AHEAD)[n];
+            for (int n = 0; n < 2; n++)
+                vector_of(i, DIRECTION)[n] = vector_of(i, RESIDUAL)[n] + now / size * vector_of(i, DIRECTION)[n];
         size = now;
     }
     for (Lasting *c = rows; c < rows + count; c++) {
         double *force = &c->x, strong = square(force[0]) + square(force[1]), b[2];
         for (int n = 0; n < 2; n++) b[n] = (force[0] * c->stress[n] + force[1] * c->stress[2 + n]) / strong;
         for (int n = 0; n < 2; n++) {
-            force[n] += of(c->disk, CHANGE)[n] - (c->other < 0 ? 0 : of(c->other, CHANGE)[n]);
+            force[n] += vector_of(c->disk, SOLUTION)[n] - (c->other < 0 ? 0 : vector_of(c->other, SOLUTION)[n]);
             for (int k = 0; k < 2; k++) c->stress[2 * n + k] = force[n] * b[k];
         }
     }

@@ -1,6 +1,6 @@
-/* The laws that every run is judged by: of the numbers, of energy and ledger, of long steps; those of
-   places are in barriers.c. Bounds are argued, not fitted: for the exact engine rounding, for the
-   others also what can happen within a step.
+/* The laws by which every run is judged: about finite numbers, energy and ledger, and long steps; those about places are
+   in barriers.c. Bounds are derived, not fitted: for the exact engine from rounding, for the others also from what can
+   happen within a step.
 
    A check shares nothing with what it checks: nothing here is from the engine's files. */
 
@@ -10,35 +10,35 @@
 
 Laws L;
 
-/* Places inside or beyond surfaces for which there is room at first. */
+/* Room for hits at first. */
 #define HITS 64
-/* Times at which the energy of all particles together is summed, and instants at which overlaps are. */
+/* Number of times at which the energy of all particles is summed, and of instants at which overlaps are. */
 #define INSTANTS 24
-/* Share of the radius that Chipmunk and the contact engine leave alone. */
+/* Overlap, in radii, that the pymunk engine does not remove. */
 #define SLOP 1e-3
-/* How the contact engine parts overlaps in a crowd: of what is beyond LEFT radii which share in a step, that of one as
-   deep as DEEP radii all, and all where gravity makes two meet as fast; by how many radii at most; and how much less
-   for an impulse, in m/s times the heaviest mass. Steps are no longer than FALL times the time in which a radius is
-   fallen, squared. */
+/* How the contact engine removes overlaps in a crowd, in radii. Overlaps up to LEFT stay. Of what is beyond, a step
+   removes the share PARTS, all of it from DEEP on, and at least what gravity closes; but no more than OPENS. It removes
+   less by GIVES / M for each N s of impulse, in m/s, with the heaviest mass M. The square of a step is at most FALL r /
+   g. */
 #define LEFT 5e-4
 #define PARTS 0.1
 #define DEEP 0.03
 #define OPENS 1e-2
 #define GIVES 3e-3
 #define FALL 8e-3
-/* m/s on Earth: what a track of the contact engine in a crowd may leave out. */
+/* m/s on Earth; changes of velocity that a track of the contact engine in a crowd may leave out. */
 #define SMOOTH 1e-4
 #define EARTH 9.81
-/* Share of the radius by which the cubic between two knots may be off the way of a particle by itself
-   with the contact engine, which writes a knot where it would be more. */
+/* Share of the radius by which the cubic between two knots may differ from the path of a particle by itself in the
+   contact engine, which writes a knot where it would be more. */
 #define BULGE 1e-5
-/* Share of the energy turned over that the contact engine may misbook in a crowd: its promise. */
+/* Share of the energy turned over by which the contact engine's ledger may be wrong in a crowd, as it promises. */
 #define BOOKED 1e-9
 /* Overlap, in radii, that the contact engine may leave in a step beyond what it asks of a solve. */
 #define UNSOLVED 0.1
 /* Share of the radius by which a track of the pymunk engine may be off between two knots. */
 #define LEAVES_OUT 1e-4
-/* Share of the radius by which the pymunk engine's disks are larger, and so their levers. */
+/* Share of the radius by which the pymunk engine enlarges its disks, and so their levers. */
 #define HAIR 1e-10
 
 
@@ -48,10 +48,10 @@ static int last_of(int i) { return L.offsets[i + 1] - 1; }
 
 static int is_released(int i) { return L.offsets[i + 1] > L.offsets[i]; }
 
-static double pace(const double *knot) { return square(knot[3]) + square(knot[4]); }
+static double speed_squared(const double *knot) { return square(knot[3]) + square(knot[4]); }
 
 static double kinetic(int i, const double *knot) {
-    return 0.5 * L.bodies[i].mass * pace(knot) + 0.5 * L.bodies[i].inertia * square(knot[5]);
+    return 0.5 * L.bodies[i].mass * speed_squared(knot) + 0.5 * L.bodies[i].inertia * square(knot[5]);
 }
 
 static double up[2]; /* the direction against gravity */
@@ -60,14 +60,14 @@ static double height(const double *knot) { return up[0] * knot[1] + up[1] * knot
 
 static double potential(int i, const double *knot) { return L.bodies[i].mass * L.bodies[i].gravity * height(knot); }
 
-/* Energy at a knot, less what the books say it got, J: what is unexplained. */
+/* Energy at a knot less what the ledger explains, J. */
 static double gain(int i, const double *knot) {
     return kinetic(i, knot) + potential(i, knot) - (knot[6] - knot[7] - knot[8]);
 }
 
-/* What a knot gives back of the losses that were booked, J, at most 0. Where the contact engine holds a
-   particle by itself in a nip, impulses of any size hold each other, and along normals seems to be given
-   what friction takes: only the sum is known. */
+/* By how much the losses of the ledger fall from the knot before to this one, J, at most 0. If the contact engine holds a
+   particle by itself in a narrow wedge, impulses of any size balance each other, and along normals it seems to gain what
+   friction takes: there only the sum counts. */
 static double given_back(const double *now) {
     const double *before = now - L.row;
     double normal = now[7] - before[7], slip = now[8] - before[8];
@@ -77,15 +77,14 @@ static double given_back(const double *now) {
 
 /* Breaches. */
 
-/* Knots that break a law, as they are found in the order of particles. */
+/* Knots that break a law, found in the order of particles. */
 typedef struct { int particles, particle, latest, knot; } Group;
 
-/* What all particles have together, and the largest and least of one; of pieces the largest coordinate and
-   length of straight ones, coordinate and radius of bent ones, and speed; `whirl` is the largest speed by which a corner
-   turns, m/s, and `reach` the largest coordinate
-   or length of all that is anywhere, m. Of particles that do not meet also
-   what is unexplained at their ends, J, the most that changes of it between two knots, and the least of
-   what `given_back` says. */
+/* Sums over all particles, and the largest and least values of one. `size` is of pieces: the largest coordinate and
+   length of segments, coordinate and radius of arcs; `belts` their largest speed. `whirl` is the largest speed of a
+   corner by rotation, m/s; `reach` the largest coordinate or length of anything, m. For particles that do not meet also
+   the energy that is unexplained at their ends, J, its largest change between two knots, and the least value of
+   `given_back`. */
 static struct {
     double mass, weight, heaviest, smallest, gravity, size[4], belts;
     double t, knot_t, place, reach, fastest, whirl, lifted, entries[3], residual, change, back;
@@ -122,8 +121,8 @@ static void tell_group(int law, const Group *group, double amount, double bound)
 
 /* Bounds. */
 
-/* The largest sizes of pieces, and what all particles have together. */
-static void weigh_machine(void) {
+/* Find the largest sizes of pieces, and the sums over all particles. */
+static void scan_machine(void) {
     sin_cos(-L.tilt, up, up + 1);
     double *start = All.size, *length = All.size + 1, *center = All.size + 2, *radius = All.size + 3;
     for (int k = 0; k < L.piece_count * members(); k++) {
@@ -149,8 +148,8 @@ static void weigh_machine(void) {
     }
 }
 
-/* Look for numbers that are not finite in a particle's track: return how many there are. */
-static int find_unreal(int i) {
+/* Count the numbers in a particle's track that are not finite. */
+static int count_not_finite(int i) {
     int unreal = 0;
     for (int k = L.offsets[i]; k < L.offsets[i + 1]; k++) {
         int own = 0;
@@ -161,17 +160,16 @@ static int find_unreal(int i) {
     return unreal;
 }
 
-/* Look at all numbers of a particle: return whether they are finite, and find the largest of each kind; also
-   the energy in play, J: what it had at most, and what was booked on it, or of a crowd what was turned
-   over. */
-PAIRED static int weigh(int i) {
+/* Read all numbers of a particle: return whether they are finite, and update the largest of each kind. Also the energy in
+   play, J: for a lone particle the most that it had or that was booked on it, for a crowd the energy turned over. */
+PAIRED static int scan_track(int i) {
     if (!is_released(i)) return 1;
     const double *first = KNOT(L.offsets[i]), *last = KNOT(last_of(i));
     double mass = L.bodies[i].mass, half = 0.5 * mass, turning = 0.5 * L.bodies[i].inertia;
     double weight = mass * L.bodies[i].gravity, begin = gain(i, first), before = begin;
     int is_nip = L.engine == ENGINE_CONTACT && !L.interact, row = L.row;
-    /* The largest x and y, change of what is unexplained and energy in play, speed squared; the least that
-       was given back; and the sum of all numbers, which times zero is zero if they are finite. */
+    /* Greatest |x| and |y|; greatest change of the unexplained energy, and energy in play; greatest square of the speed;
+       least of `given_back`; and the sum of all numbers, which times zero is zero if they are finite. */
     Two place = both(0), energy = both(0), fastest = both(0), back = both(0), all = both(0);
     Two old = two_at(first + 7);
     for (const double *knot = first; knot <= last; knot += row) {
@@ -194,7 +192,7 @@ PAIRED static int weigh(int i) {
     All.place = MAX(All.place, MAX(place[0], place[1]));
     All.fastest = MAX(All.fastest, fastest[0]);
     if (L.interact) {
-        /* What swings to and fro may have none at its start. */
+        /* A pendulum may have no kinetic energy at its start. */
         L.energy += L.joined ? half * fastest[0] : kinetic(i, first);
         All.lifted += potential(i, last) - potential(i, first);
         for (int n = 0; n < 3; n++) All.entries[n] += last[6 + n];
@@ -204,12 +202,12 @@ PAIRED static int weigh(int i) {
         All.change = MAX(All.change, energy[0]);
         All.back = MIN(All.back, MIN(back[0], back[1]));
     }
-    int unreal = is_all(0 * all == 0) ? 0 : find_unreal(i);
+    int unreal = is_all(0 * all == 0) ? 0 : count_not_finite(i);
     All.unreal += unreal;
     return !unreal;
 }
 
-/* Tell whether all numbers are finite, once all particles are weighed. */
+/* Report whether all numbers are finite, after all particles have been read. */
 static int are_finite(void) {
     L.energy += fabs(All.lifted) + fabs(All.entries[0]) + fabs(All.entries[1]) + fabs(All.entries[2]);
     All.unreal += L.unreal;
@@ -219,7 +217,7 @@ static int are_finite(void) {
     return !All.unreal;
 }
 
-/* Largest acceleration towards the centre of a bent piece of knots of a particle that are inside, m/s2. */
+/* Greatest acceleration of a particle towards the centre of an arc, m/s2, over those of its knots that are inside. */
 static double bent_by(const Barrier *b, double r, int first, int end) {
     double inner = b->radius - r, low = MAX(inner - 0.1 * r, 0), found = 0;
     if (b->mover) return inner > 0 ? square(L.speed) / inner : 0;
@@ -227,13 +225,13 @@ static double bent_by(const Barrier *b, double r, int first, int end) {
         const double *knot = KNOT(k);
         double far = square(knot[1] - b->x) + square(knot[2] - b->y);
         if (far < square(low) || far >= square(inner + 0.1 * r)) continue;
-        if (is_within(b, knot[1], knot[2], 0)) found = MAX(found, pace(knot) / inner);
+        if (is_within(b, knot[1], knot[2], 0)) found = MAX(found, speed_squared(knot) / inner);
     }
     return found;
 }
 
-/* The same of all particles and pieces. Outside it is never more than gravity's: what is faster leaves. No
-   particle is inside the drive pulley. */
+/* The same over all particles and pieces. Outside an arc the acceleration is never above that of gravity, as a faster
+   particle lifts off. No particle is inside the drive pulley. */
 PAIRED static double bent_inside(void) {
     double found = 0;
     int bent = 0;
@@ -257,11 +255,11 @@ PAIRED static double bent_inside(void) {
     return found;
 }
 
-/* How far beyond a surface a step may take a disk, m. Where steps are all alike a contact is seen up to a
-   step late, so by the way of a step, and Chipmunk leaves its slop. A lone particle's blows are found at
-   their own instants; where it stays in contact a step goes straight on, off by less than a dt2. On a
-   straight surface a is the weight, on a rim it is v2 / rho besides, which is no more than g where it
-   does not lift off; inside an arc it may be more. In a crowd of the contact engine disks are pressed. */
+/* How far a step may take a disk beyond a surface, m. If all steps are alike (Chipmunk), a contact is found up to a step
+   late, so it is the path in a step, and Chipmunk's slop. Impacts of a lone particle are resolved at their instants;
+   where it stays in contact, a step goes straight on, off by less than a dt^2. On a straight surface a is g; on a rim
+   also v^2 / rho, which is at most g if the disk does not lift off; inside an arc it may be more. In a crowd of the
+   contact engine disks are pressed into each other. */
 static double lateness(void) {
     if (L.engine == ENGINE_EXACT) return 0;
     if (L.alike) return (L.speed + All.whirl) * L.dt + SLOP * L.largest;
@@ -269,11 +267,11 @@ static double lateness(void) {
     return (2 * (All.gravity + L.haste) + L.bent) * square(L.dt);
 }
 
-/* What numbers may do to the energy, as a share of the energy in play. Contacts round it; for this the weight
-   of what meets no other is in play at the largest length: a height is as good as the coordinates that it
-   comes from, also where it is small itself, as that of a disk in a hollow hardly wider. In a stepped
-   engine each contact moves it, besides, by the weight times `late`, where an overlap is parted: impulses
-   themselves are booked to the last bit. */
+/* Error of the energy by rounding, as a share of the energy in play. Every contact rounds it. For particles that do not
+   meet, the energy in play includes their weight times the largest length, because a height is only as exact as the
+   coordinates that it comes from, even if it is small itself (a disk in an arc that is hardly wider). In a stepped engine
+   each contact also changes the energy by the weight times `late`, where an overlap is removed; the impulses themselves
+   are booked exactly. */
 static double energy_share(void) {
     double share = EPS * (ROUNDINGS + A_CONTACT * (double)L.contacts), touched = MAX(1, L.contacts);
     if (L.engine == ENGINE_EXACT) return share;
@@ -283,9 +281,9 @@ static double energy_share(void) {
     return share + (L.energy ? touched * All.heaviest * All.gravity * L.late / L.energy : 0);
 }
 
-/* Energy that parting overlaps may give, J: no more than lifts all by how deep they were. Of lone
-   particles a knot in contact holds the mean velocity of a step, half a step's pull off its books: that
-   of the weight along the way, and across it that of an arc's inside. */
+/* Energy that the removal of overlaps may give, J: at most what lifts all particles by the greatest overlap. For lone
+   particles a knot in contact has the mean velocity of a step, which differs from its ledger by half a step's
+   acceleration: that of gravity along the path, and that of an arc across it. */
 static double energy_parted(void) {
     if (L.engine == ENGINE_EXACT) return 0;
     if (!L.interact) {
@@ -294,16 +292,16 @@ static double energy_parted(void) {
     }
     double allowed = All.mass * All.gravity * L.late;
     if (L.alike) {
-        /* The pymunk engine leaves out touches that move a track by less than LEAVES_OUT of the radius.
-           A cubic whose end velocity is off by w is off by 4/27 w tau in place, tau a step or more. */
+        /* The pymunk engine leaves out contacts that move a track by less than LEAVES_OUT of the radius. A cubic with an
+           end velocity that is off by w is off by 4/27 w tau in place, where tau is a step or more. */
         double off = 27.0 / 4 * LEAVES_OUT * L.largest / L.dt;
         allowed += 2 * All.heaviest * L.speed * off;
     }
     return allowed;
 }
 
-/* How deep a disk may be in a surface, by what was weighed so far, and an acceleration inside arcs. The
-   clock's own rounding moves a particle: half an ulp of t, times its speed. */
+/* Set how deep a disk may be in a surface, from what has been read so far and an acceleration inside arcs. The rounding
+   of the clock moves a particle, too: by half an ulp of t times its speed. */
 static void find_allowed(double bent) {
     const double *start = All.size, *length = All.size + 1, *center = All.size + 2, *radius = All.size + 3;
     L.speed = MAX(sqrt(All.fastest), All.belts);
@@ -323,7 +321,7 @@ static void find_bounds(void) {
     if (!L.interact) L.energy += All.weight * All.reach;
     L.energy_bound = energy_share();
     L.parted = energy_parted();
-    /* m v w, where constant acceleration is as good as the true way but for a velocity w. */
+    /* m v w: in a crowd a track may leave out a change w of the velocity. */
     double swift = All.gravity > 0 ? sqrt(All.gravity / EARTH) : 1;
     int crowd = L.interact && L.engine == ENGINE_CONTACT;
     L.untold = crowd ? All.mass * L.speed * SMOOTH * swift : 0;
@@ -370,7 +368,7 @@ static void tell_hits(int passes) {
 
 /* Energy. */
 
-/* The last knot of a particle that is not after a time, but the last of all; -1 if it is not there. */
+/* The last knot of a particle at or before a time, but never the last of all; -1 if the particle isn't there then. */
 static int knot_before(int i, double t) {
     int low = L.offsets[i], high = last_of(i);
     if (high < low || t < KNOT(low)[0] || t > KNOT(high)[0]) return -1;
@@ -382,9 +380,9 @@ static int knot_before(int i, double t) {
     return low;
 }
 
-/* What all together have at some time that is unexplained, J: the most of the least that it may be. When
-   between its knots a particle got energy from another is not told, only how much: at any time between
-   them it has at least the lesser of what is unexplained at the two. */
+/* Unexplained energy of all particles together, J: the greatest, over some times, of its lower bound. It isn't recorded
+   when a particle got energy from another between its knots, only how much: at any time between two knots it has at least
+   the lesser of the values at both. */
 static double risen(void) {
     double found = 0;
     int end = L.offsets[L.particle_count], stride = MAX(1, end / INSTANTS);
@@ -411,7 +409,7 @@ static double sum_opened(double depth, double least, double step) {
     return depth > 0 ? square(MIN(share, OPENS) * least / step) : 0;
 }
 
-/* Orders numbers of rows by the first number of each. */
+/* Sort the numbers of rows by the first number of each row. */
 static const double *Rows;
 static int Row;
 
@@ -426,9 +424,9 @@ static void sort(int *numbers, int count, const double *rows, int row) {
     qsort(numbers, count, sizeof(int), compare);
 }
 
-/* Energy that parting overlaps may give in a step at a time, J. A solve raises the kinetic energy by at most
-   the sum of J a, J the impulse of a contact and a the speed with which it is to open. Of an overlap d that
-   is a = p d / h - c J, a spring's, with c = GIVES / M: J a is at most (p d / h)2 / (4 c). */
+/* Energy that the removal of overlaps may give in a step at a time, J. A solve raises the kinetic energy by at most the
+   sum of J a, where J is the impulse of a contact and a the speed at which it is to open. An overlap d opens like a
+   spring: a = p d / h - c J, with c = GIVES / M. So J a is at most (p d / h)^2 / (4 c). */
 static double opened(double t) {
     double step = L.dt, sum = 0, *at = L.places;
     int *there = L.order, count = 0;
@@ -464,11 +462,11 @@ static double opened(double t) {
     return All.heaviest / (4 * GIVES) * sum;
 }
 
-/* An instant of a crowd, and all that is given back there, J. */
+/* An instant of a crowd, and all that is given back then, J. */
 typedef struct { double t, given; } Instant;
 
-/* Find the instants at which more is given back than overlaps may give, among those at which most is: in a
-   crowd of the contact engine all that ends at one instant is one sum. */
+/* Find the instants at which more energy is given back than overlaps may give, among those at which most is given back.
+   In a crowd of the contact engine only the sum over an instant counts. */
 static int beyond_overlaps(double most, Instant *worst, double *least) {
     int count = 0, found = 0, bad = 0, *rows = L.order;
     for (int i = 0; i < L.particle_count; i++) {
@@ -494,10 +492,10 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
     return bad;
 }
 
-/* Energy and ledger. Of lone particles what is unexplained may not change from knot to knot; particles that
-   meet give energy to each other, so of them it is the sum of all at some times, and what the solves of the
-   contact engine gained. Losses that are booked are never less than before but by what parting overlaps
-   gives: where many do so at one instant, those that overlap there. */
+/* Judge energy and ledger. For lone particles the unexplained energy must not change from knot to knot. Particles that
+   meet give energy to each other, so for them it is the sum over all at some times, and what the solves of the contact
+   engine gained. Losses must not fall, except by what the removal of overlaps gives; if many fall at one instant, by what
+   the overlaps of that instant give. */
 static void judge_books(double bound) {
     double most = bound + L.parted, least = most, rise = 0, back = 0, residual = All.residual, low = 0;
     int crowd = L.interact && L.engine == ENGINE_CONTACT, count = 0, surface = -1;
@@ -547,8 +545,8 @@ static void judge_books(double bound) {
     if (L.interact && L.unsolved > UNSOLVED) tell(LAW_SOLVED, L.unsolved, UNSOLVED);
 }
 
-/* Where Chipmunk looks for contacts at the ends of steps only, none may go past one in a step. What flies
-   where nothing is does no harm: judged is what may reach a surface or another in it. */
+/* If Chipmunk finds contacts only at the ends of steps, no particle may move past one in a step. A particle that flies
+   where nothing is does no harm: only those that may reach a surface, or another particle, in a step are judged. */
 static void judge_steps(void) {
     double box[4] = {INFINITY, INFINITY, -INFINITY, -INFINITY}, way = 0, radius = 1;
     if (!L.alike || L.speed * L.dt < All.smallest || !(L.piece_count || L.interact)) return;
@@ -564,7 +562,7 @@ static void judge_steps(void) {
         double r = L.bodies[i].radius;
         for (int k = L.offsets[i]; k < L.offsets[i + 1]; k++) {
             const double *knot = KNOT(k);
-            double own = sqrt(pace(knot)) * L.dt, reach = r + own;
+            double own = sqrt(speed_squared(knot)) * L.dt, reach = r + own;
             if (own < r) continue;
             if (L.piece_count && (knot[1] < box[0] - reach || knot[1] > box[2] + reach
                 || knot[2] < box[1] - reach || knot[2] > box[3] + reach)) continue;
@@ -577,7 +575,7 @@ static void judge_steps(void) {
     tell_group(LAW_STEP, &bad, way, radius);
 }
 
-/* Lay out what the host fills in, and what is told. */
+/* Reserve the arrays that the host fills in, and those of the results. */
 EXPORT int lay_out_laws(void) {
     int crowd = L.interact && L.engine == ENGINE_CONTACT;
     RESERVE(L.knots, (double)L.knot_count * L.row);
@@ -595,35 +593,35 @@ EXPORT int lay_out_laws(void) {
     return has_room();
 }
 
-/* Find the knots of a particle behind those of the one before. */
+/* Find the knots of a particle: they follow those of the one before. */
 static void find_track(int i) {
     int k = L.offsets[i];
     while (k < L.knot_count && ((const Knot *)KNOT(k))->disk == i) k++;
     L.offsets[i + 1] = k;
 }
 
-/* Judge a run, if there is room for all hits. Each particle is looked at once, while its knots are at hand:
-   what is not deeper than it might be for itself alone is not so in any run. Where something is, or could
-   be at every contact, as in steps that are all alike, all are looked at again. */
+/* Judge a run, if there is room for all hits. First each particle is checked once, while its knots are in the cache: an
+   overlap that is allowed for the particle alone is allowed in the whole run. If there is a larger one, or if steps are
+   all alike, so that every contact may overlap, all are checked again. */
 static void judge_all(void) {
     int again = L.alike;
     L.breach_count = L.hit_count = 0;
     L.energy = L.haste = 0;
     memset(&All, 0, sizeof All);
     shape_barriers();
-    weigh_machine();
+    scan_machine();
     find_allowed(0);
     for (int i = 0; i < L.particle_count; i++) {
         if (L.owned) find_track(i);
-        if (weigh(i) && !again) again = find_hits(i);
+        if (scan_track(i) && !again) again = find_hits(i);
     }
-    if (!are_finite()) return; /* The other laws say nothing about what is no number. */
+    if (!are_finite()) return; /* The other laws mean nothing if a number is not finite. */
     find_bounds();
     L.hit_count = 0;
     for (int i = 0; i < L.particle_count && again; i++) find_hits(i);
     if (L.hit_count > L.hit_room) return;
-    /* What is at rest in a crowd turns nothing over: its heights are rounded all the same, and those of what joints
-       pull in each step, to and fro. */
+    /* A crowd at rest turns over no energy, but its heights are rounded all the same; with joints, which pull to and fro,
+       once in each step. */
     double rounds = L.interact ? EPS * All.weight * All.reach * (L.joined ? sqrt(MAX(L.steps, 1)) : 1) : 0;
     double bound = L.energy_bound * L.energy + rounds;
     tell_hits(1);
@@ -632,7 +630,7 @@ static void judge_all(void) {
     judge_steps();
 }
 
-/* Judge a run: tell the laws that it breaks, each once, losses twice at most, in their order. */
+/* Judge a run: report each law that it breaks once, that of losses up to twice, in the order of the laws. */
 EXPORT int judge(void) {
     for (int room = HITS; room; room = L.hit_count > room ? L.hit_count : 0) {
         RESERVE(L.hits, room);

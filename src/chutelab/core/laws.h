@@ -10,7 +10,7 @@
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 
-/* Two numbers side by side, such as x and y: what is done to both takes one instruction. */
+/* Two numbers side by side, such as x and y: one instruction works on both. */
 #define PAIRED __attribute__((target("simd128")))
 typedef double Two __attribute__((vector_size(16), aligned(8)));
 typedef long long Truth __attribute__((vector_size(16)));
@@ -25,12 +25,11 @@ PAIRED static inline int is_all(Truth a) { return __builtin_wasm_all_true_i64x2(
 
 extern Laws L;
 
-/* Machines, and that of a particle. */
+/* Number of members of a family, and the member that a particle belongs to. */
 static inline int members(void) { return L.each ? L.particle_count / L.each : 1; }
 static inline long member_of(int i) { return L.each ? i / L.each : 0; }
 
-/* Intervals, or knots, whose common box tells which pieces they may meet: those that follow each other are
-   near each other. */
+/* Number of consecutive intervals, or knots, that are first checked by a common box: they are near each other. */
 #define WIDTH 32
 
 /* A knot by its number. */

@@ -3,7 +3,7 @@
 #include "loads.h"
 #include "memory.h"
 
-/* Bins that there is room for at first. */
+/* Number of bins at first. */
 #define FIRST 64
 
 Loads B;
@@ -30,7 +30,7 @@ EXPORT int lay_out_bins(int owners, int disks) {
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 
-/* Make room for a bin. Without it all later ones are one, and the host is told. */
+/* Make room for a bin. If there is none, all later loads are added to the last bin, and the host is told. */
 static void make_bin(int bin) {
     B.used = MAX(B.used, bin + 1);
     while (bin >= B.bin_count && !B.overflow) {
@@ -44,7 +44,8 @@ static void make_bin(int bin) {
     B.used = MIN(B.used, B.bin_count);
 }
 
-/* Add shares of a push to the bins from one to another: at the first `at` (s) after it began, each `bin` long. */
+/* Add shares of a push to the bins from `first` to `last`: `at` (s) is the time from its beginning to that of the first
+   bin, `bin` the length of each. */
 static void add(const Push *p, int first, int last, double share, double at, double bin) {
     double jx = -share * p->jx, jy = -share * p->jy, normal = -(jx * p->nx + jy * p->ny);
     double along = jx * p->ny - jy * p->nx, couple = share * p->couple;
@@ -77,7 +78,7 @@ void bear(const Push *p) {
     }
 }
 
-/* Where the row of a pair in this bin is told, or is to be: in `seats`. */
+/* The entry of `seats`, a hash table, that holds or is to hold the row of a pair in this bin. */
 static int *seat_of(int disk, int other) {
     unsigned at = (unsigned)disk * 2654435761u + (unsigned)other * 40503u;
     for (;; at++) {
@@ -87,14 +88,14 @@ static int *seat_of(int disk, int other) {
     }
 }
 
-/* Begin a bin; or, with twice as many seats, seat its rows anew. */
+/* Begin a bin, or enter its rows again after the table has grown. */
 static void seat_all(void) {
     memset(B.seats, 0, B.seat_count * sizeof *B.seats);
     for (int n = B.first; n < B.lasting_count; n++)
         if (B.lasting[n].from == B.bin * B.each) *seat_of(B.lasting[n].disk, B.lasting[n].other) = n + 1;
 }
 
-/* A further row, all zero; 0 where there is no room. */
+/* Another row, all zero; 0 if there is no room. */
 static Lasting *next_row(void) {
     if (B.overflow || (B.lasting_count == B.lasting_room && !STRETCH(B.lasting, B.lasting_count, B.lasting_room))) {
         B.overflow = 1;
@@ -110,7 +111,7 @@ static void add_to(Lasting *row, double share, double x, double y, const double 
     for (int n = 0; n < 4; n++) row->stress[n] += share * stress[n];
 }
 
-/* Keep a row by itself. */
+/* Record a row of its own. */
 static void keep_row(int disk, int other, double from, double to, double share, double x, double y, const double *stress) {
     Lasting *row = next_row();
     if (!row) return;

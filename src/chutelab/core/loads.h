@@ -1,33 +1,33 @@
-/* What surfaces bear in bins of time: sums of impulses, where engines tell of each. No mechanics. */
+/* Loads on surfaces in bins of time: sums of the impulses that engines report. No mechanics. */
 
 #ifndef LOADS_H
 #define LOADS_H
 #include "layout.h"
 
-/* What a surface bears in a time. Without acceleration and velocity the place stays; an impulse is spread
-   evenly, at an instant it is all in one bin. */
+/* A load on a surface from one time to another. Its place moves with a velocity and an acceleration, if there are any.
+   The impulse is spread evenly over the time; at an instant it is in one bin. */
 typedef struct {
     int owner;
     double from, to;        /* s */
-    double x, y, vx, vy, ax, ay; /* of the place on the surface, as the time begins */
+    double x, y, vx, vy, ax, ay; /* of the place on the surface, at the beginning */
     double nx, ny;          /* unit normal of the surface, towards the particle */
     double jx, jy, couple;  /* on the particle, N s and N m s */
 } Push;
 
 extern Loads B;
 
-/* Set the first bins apart; 0 if there is no memory. */
+/* Reserve the first bins; return 0 if there is no memory. */
 int lay_out_bins(int owners, int disks);
 
 void bear(const Push *p);
 
-/* Keep what a lasting contact gave a disk between two times: the impulse J, and b, see `Lasting`. */
+/* Record what a lasting contact gave a disk between two times: the impulse J, and b, see `Lasting`. */
 void keep_contact(int disk, int other, double from, double to, const double *J, const double *b);
 
-/* Keep what holds a sleeper from then on, each second, until it wakes. */
+/* Record the force that holds a sleeper from a time on, until the disk wakes. */
 void keep_asleep(int disk, int other, double from, const double *force, const double *b);
 
-/* A disk woke: what held it, did so for some time. */
+/* Turn the forces that held a disk into impulses of some time, as the disk has woken. */
 void keep_awake(int disk, double to, double time);
 
 #endif

@@ -3,13 +3,13 @@
 #include "memory.h"
 
 #define PAGE 65536.0
-#define MOST 4294901760.0 /* bytes that addresses of 32 bits reach, in whole pages */
+#define MOST 4294901760.0 /* bytes; all that addresses of 32 bits reach, in whole pages */
 
 extern unsigned char __heap_base;
 
 static Room R;
 
-/* Up to where memory has been in use: beyond it is zero. */
+/* End of the memory that has been in use; beyond it all bytes are zero. */
 static double used;
 
 EXPORT Room *room(void) {

@@ -5,26 +5,26 @@
 
 #define EXPORT __attribute__((visibility("default")))
 
-/* Set bytes apart, all zero, for so many rows; NULL if there are none to be had. */
+/* Reserve memory for so many rows, all zero; NULL if there is not enough. */
 __attribute__((noinline)) void *reserve(double count, unsigned size);
 
-/* The same, of any bytes: for what is written before it is read. */
+/* The same without clearing it: for arrays that are written before they are read. */
 __attribute__((noinline)) void *set_apart(double count, unsigned size);
 
-/* Have an array of `had` rows, of which `count` are in use, go on elsewhere with twice as many. */
+/* Copy an array of `had` rows, of which `count` are in use, to a place with twice as many rows. */
 void *stretch(const void *rows, int count, int had, unsigned size);
 
-/* Knots, or events, of a run of particles that do not meet, up to which there is made more room for them
-   before the host is to take them. */
+/* Greatest number of knots, or of events, of a run of particles that do not meet for which room is made before the host
+   has to take them. */
 #define KEPT 160000
 
-/* Whether all that was reserved is there. */
+/* Whether all that was asked for could be reserved. */
 int has_room(void);
 
-/* Have a field point to so many rows. */
+/* Point a field to so many new rows. */
 #define RESERVE(field, count) ((field) = reserve(count, sizeof *(field)))
 
-/* Have a field point to twice as many rows, of which so many are in use; `room` is how many there are. */
+/* Point a field to twice as many rows, of which `count` are in use; `room` is their number. */
 #define STRETCH(field, count, room) \
     ((field) = stretch(field, count, room, sizeof *(field)), (room) *= 2, (field) != 0)
 

@@ -1,18 +1,18 @@
-/* The nominal particle up to the plate's line: what the machine's geometry is measured from. */
+/* The nominal particle up to the line of the plate: the geometry of the machine is measured from its impact. */
 
 #include "plan.h"
 
-/* When gap + rate t + acceleration t^2/2 crosses zero downwards; NaN or an infinity if never.
+/* Time at which gap + rate t + acceleration t^2/2 crosses zero downwards; NaN or an infinity if it never does.
 
-   A parabola crosses any level downwards at most once, with the slope -S, S^2 = rate^2 - 2
-   acceleration gap. Of the two forms of the root that without cancellation is taken. */
+   A parabola crosses any level downwards at most once, with the slope -S, S^2 = rate^2 - 2 acceleration gap. Of both
+   forms of the root, the one without cancellation is used. */
 double falls_below(double gap, double rate, double acceleration) {
     double span = fabs(rate) + sqrt(rate * rate - (acceleration + acceleration) * gap);
     if (span == 0.0 && gap == 0.0 && acceleration < 0.0) return 0.0;
     return rate > 0.0 ? span / -acceleration : (gap + gap) / span;
 }
 
-/* The direction in which the incoming belt runs. */
+/* The unit vector in which the incoming belt runs. */
 void up_belt(const IncomingKeys *belt, double *dx, double *dy) {
     sin_cos(belt->incline_deg * RADIANS, dy, dx);
 }
@@ -30,7 +30,7 @@ int is_on_belt(const Tables *t, int stream) {
     return -belt->length <= along && along <= 0.0 && fabs(above - riding) <= ON_BELT;
 }
 
-/* The nominal release point of a stream, m; on the belt exactly at the riding height. */
+/* The nominal release point of a stream, m; on the belt at exactly the riding height. */
 void release_point(const Tables *t, int stream, double *place) {
     const StreamKeys *its = t->streams + stream;
     const IncomingKeys *belt = t->incoming;
@@ -58,7 +58,7 @@ void release_velocity(const Tables *t, int stream, double *velocity) {
     velocity[1] *= t->incoming->speed;
 }
 
-/* Follow particle 0 along belt and pulley to where free flight begins. */
+/* Follow particle 0 along belt and pulley to the beginning of its flight. */
 static void discharge(const Tables *t, Nominal *out) {
     const IncomingKeys *belt = t->incoming;
     double *place = out->position, *velocity = out->velocity, dx, dy;
@@ -89,7 +89,8 @@ static void discharge(const Tables *t, Nominal *out) {
         velocity[1] = -w * up;
         return;
     }
-    /* Adhesion lets go where cos phi1 = v^2/(g rho), Eq. (2), or where the belt ends if that is more. */
+    /* Adhesion ends where cos phi1 = v^2/(g rho), Eq. (2), or where the belt meets the pulley, if that value is above cos
+       phi there. */
     double ratio = belt->speed * belt->speed / (gravity * rho);
     double grip = belt->speed > 0.0 ? MIN(ratio, dx) : NAN;
     double side = sqrt((1.0 - grip) * (1.0 + grip));
@@ -100,8 +101,8 @@ static void discharge(const Tables *t, Nominal *out) {
     velocity[1] = 0.0 - belt->speed * side;
 }
 
-/* Fly particle 0 to the plate's unbounded line, whose struck face has the normal (-cos a, -sin a):
-   they touch when the centre is r in front of it. */
+/* Follow particle 0 to the unbounded line of the plate, whose struck face has the normal (-cos a, -sin a): they touch
+   when its centre is r in front of the face. */
 void fly_nominal(const Tables *t, Nominal *out) {
     const PlateKeys *plate = t->plate;
     out->hit[0] = out->hit[1] = NAN;

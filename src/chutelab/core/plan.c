@@ -1,17 +1,17 @@
 /* The machine of a scene: its belts, plates, conveyors and free surfaces as segments and arcs.
 
-   The outgoing belt hangs from where the nominal particle meets the plate, and the plate's lower end
-   stays above that belt. */
+   The height of the outgoing belt is measured from the impact of the nominal particle on the plate, and the lower end of
+   the plate stays above that belt. */
 
 #include <string.h>
 #include "plan.h"
 
-/* m of plate below the pivot where there is no outgoing belt to stop short of. */
+/* m of plate below the pivot if there is no outgoing belt. */
 #define REACH_WITHOUT_BELT 2.0
 /* m of a further plate below its pivot. */
 #define REACH_HANGING 0.5
-/* m that the plate's lower end stays above the outgoing belt, at least; the same in radii: a disk
-   that lies on the belt passes under the plate, with one to spare. */
+/* Least distance of the plate's lower end from the outgoing belt, in m and in radii: a disk that lies on the belt passes
+   under the plate, with a radius to spare. */
 #define CLEARANCE 0.05
 #define CLEARANCE_RADII 3.0
 
@@ -19,7 +19,8 @@ Plan P;
 
 EXPORT Plan *plan(void) { return &P; }
 
-/* Lay out the rows of numbers, which the host fills in; it may have done so where the first array begins. */
+/* Reserve the rows of numbers, which the host fills in. It may have filled them in already: they are at the place of the
+   first array and are not cleared. */
 EXPORT int lay_out_plan(void) {
     P.rows = set_apart((double)P.members * P.width + P.term_width, sizeof *P.rows);
     P.terms = P.rows + P.members * P.width;
@@ -55,12 +56,12 @@ Tables tables_of(int member) {
     return t;
 }
 
-/* Where the pieces of this member are written, or NULL while they are counted; how many there are. */
+/* Where the pieces of this member are written, or NULL while they are counted; and how many there are. */
 static Segment *segments;
 static Arc *arcs;
 static int segment_count, arc_count;
 
-/* Lay a straight piece of a surface. */
+/* Add a segment to a surface. */
 static Segment *lay_segment(int surface, double x, double y, double x1, double y1, double speed,
                             const double *gate) {
     static Segment none;
@@ -84,7 +85,8 @@ static void lay_arc(int surface, double x, double y, double radius, double begin
 
 static const double ALWAYS[] = { -INFINITY, INFINITY };
 
-/* A plate that hangs from a pivot: upwards, so that its struck face (-cos a, -sin a) is on the left. */
+/* Add a plate that hangs from a pivot. Its segment leads upwards, so that its struck face (-cos a, -sin a) is on the
+   left. */
 static void lay_plate(int surface, double x, double y, double angle_deg, double below,
                       double above) {
     double sine, cosine;
@@ -93,7 +95,7 @@ static void lay_plate(int surface, double x, double y, double angle_deg, double 
                 0.0, ALWAYS);
 }
 
-/* A belt round two pulleys: forward on top, which is clockwise to the right, and back. */
+/* Add a belt round two pulleys: forward on top, which is clockwise if it leads to the right, and back below. */
 static void lay_conveyor(int surface, const ConveyorKeys *c) {
     double x0 = c->from[0], y0 = c->from[1], x1 = c->to[0], y1 = c->to[1], r = c->pulley_radius;
     double way = length_of(x1 - x0, y1 - y0), dx = (x1 - x0) / way, dy = (y1 - y0) / way;
@@ -104,11 +106,11 @@ static void lay_conveyor(int surface, const ConveyorKeys *c) {
     lay_arc(surface, x1, y1, r, 0.0, 2.0 * PI, clockwise * c->speed, ALWAYS, 0);
 }
 
-/* One copy of a free surface, moved by (dx, dy), from its gate's opening to its closing. */
+/* Add a copy of a free surface, moved by (dx, dy), that exists from gate[0] to gate[1]. */
 static void lay_copy(int surface, const SurfaceKeys *s, const double *points, double dx, double dy,
                      const double *gate) {
     int last = (int)s->corners - 1;
-    /* Solid on the side that it lets through to: that is its left, where its normal leads there. */
+    /* A one-sided segment is solid on the side to which it lets particles pass: its left (1) or its right (-1). */
     double sense = isnan(s->passes) ? 0.0 : s->passes < 0.0 ? -1.0 : 1.0;
     for (int n = 0; n < last; n++, points += 2) {
         double way = fabs(s->passes) == PASSES_UP ? points[2] - points[0] : points[1] - points[3];
@@ -121,7 +123,7 @@ static void lay_copy(int surface, const SurfaceKeys *s, const double *points, do
             fabs(end - first), s->to_deg < s->from_deg ? s->speed : -s->speed, gate, (int)sense);
 }
 
-/* A free surface with all its copies, and when they are there. */
+/* Add a free surface with all its copies, for the times at which it exists. */
 static void lay_surface(int surface, const SurfaceKeys *s, const double *points) {
     double opens = isnan(s->opens_at) ? INFINITY : s->opens_at;
     double closes = isnan(s->closes_at) ? -INFINITY : s->closes_at;
@@ -140,7 +142,7 @@ static void lay_surface(int surface, const SurfaceKeys *s, const double *points)
             }
 }
 
-/* The incoming belt, the damping plate and the outgoing belt; the number of the next surface. */
+/* Add the incoming belt, the damping plate and the outgoing belt. Return the number of the next surface. */
 static int lay_transfer(const Tables *t, Nominal *found) {
     const IncomingKeys *belt = t->incoming;
     const PlateKeys *plate = t->plate;
@@ -179,7 +181,7 @@ static int lay_transfer(const Tables *t, Nominal *found) {
     return surface;
 }
 
-/* All surfaces of a member, in the order of the ledger. */
+/* Add all surfaces of a member, in the order of the ledger. */
 static void lay_all(const Tables *t, Nominal *found) {
     const double *points = t->points;
     int surface = t->incoming ? lay_transfer(t, found) : 0;
@@ -203,8 +205,7 @@ int is_moved(const Tables *t, int surface) {
     return 0;
 }
 
-/* Find what a surface moves about, if that is not given: the pivot of a plate, else its first point, or
-   the centre of an arc. */
+/* Find the pivot of a moving surface if none is given: that of a plate, else its first point, or the centre of an arc. */
 static void find_pivot(const Tables *t, int surface, double *pivot) {
     const double *found = 0, *points = t->points;
     int next = P.incoming, damps = t->incoming && t->plate;
@@ -226,8 +227,8 @@ static void find_pivot(const Tables *t, int surface, double *pivot) {
     pivot[1] = found[1];
 }
 
-/* Add what a piece of a length, even along it, adds to length, place and their squares, from a pivot; its middle
-   is at (x, y), its own mean square distance from there `wide`. */
+/* Add a piece of even density to the sums of length, length times place, and length times squared distance from the
+   pivot. Its middle is at (x, y); `wide` is its own mean square distance from there. */
 static void weigh_piece(const Mover *m, double length, double x, double y, double wide, double *sums) {
     x -= m->pivot[0];
     y -= m->pivot[1];
@@ -237,7 +238,7 @@ static void weigh_piece(const Mover *m, double length, double x, double y, doubl
     sums[3] += length * (x * x + y * y + wide);
 }
 
-/* Have a surface hang on a hinge. A mass lies evenly along it; where an inertia alone is given, it has no weight. */
+/* Make a surface a hinge. Its mass is distributed evenly along it; if only an inertia is given, it has no weight. */
 static void lay_hinge(const MoverKeys *k, Mover *m) {
     double sums[4] = { 0.0, 0.0, 0.0, 0.0 };
     for (const Segment *s = P.segments; s < P.segments + P.segment_count; s++) {
@@ -266,7 +267,7 @@ static void lay_hinge(const MoverKeys *k, Mover *m) {
     m->motor[1] = k->torque;
 }
 
-/* Write how surfaces move: keys that are not given are no motion. */
+/* Set how surfaces move; a key that is not given is no motion. */
 static void lay_movers(const Tables *t) {
     for (int n = 0; n < P.moving; n++) {
         const MoverKeys *k = t->movers + n;
@@ -289,7 +290,7 @@ static void lay_movers(const Tables *t) {
     }
 }
 
-/* Lay all surfaces of a member, or count them if there is no place yet. */
+/* Add all surfaces of a member, or count them if no arrays are reserved yet. */
 static void build_member(int member) {
     Tables t = tables_of(member);
     Nominal found = { .along = NAN, .below = NAN };
@@ -299,7 +300,7 @@ static void build_member(int member) {
     P.nominal[member] = found;
 }
 
-/* Build the machine of each member, which have as many pieces each; and lay out what is drawn into. */
+/* Build the machines of all members, which have equal numbers of pieces, and reserve the arrays of the drawing. */
 EXPORT int build(void) {
     segments = 0;
     arcs = 0;

@@ -1,4 +1,4 @@
-/* What the files share that build machines: the plan, the tables of one scene, a line a function. */
+/* What the files that build machines share: the plan, the tables of a scene, and their functions. */
 
 #ifndef PLAN_H
 #define PLAN_H
@@ -9,14 +9,14 @@
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 
-/* m; how near to the belt's height R + r a release counts as lying on the belt. */
+/* m; a release this near to the height R + r above the belt counts as lying on it. */
 #define ON_BELT 1e-9
-/* Share of a speed on the belt that is rounding. */
+/* Share of a speed on the belt; less is rounding. */
 #define ALONG 1e-12
 
 extern Plan P;
 
-/* The tables of one scene, and the points of its polylines. */
+/* The tables of a scene, and the points of its polylines. */
 typedef struct {
     const SceneKeys *scene;
     const ParticleKeys *particles, *particle; /* all kinds; that of the nominal particle */

@@ -1,15 +1,15 @@
-/* The random numbers of NumPy's `default_rng`, to the last bit: PCG64 (M. O'Neill, 2014, XSL-RR),
-   seeded by what NumPy calls a SeedSequence. */
+/* The random numbers of NumPy's `default_rng`, to the last bit: PCG64 (M. O'Neill, 2014, XSL-RR), seeded by what NumPy
+   calls a SeedSequence. */
 
 #include "releases.h"
 
-#define POOL 4 /* words; of a seed there are no more */
+#define POOL 4 /* words; a seed has no more */
 
 typedef unsigned long long Word;
 
 static unsigned folded(unsigned value) { return value ^ value >> 16; }
 
-/* Hash a word; the constant changes with each. */
+/* Hash a word; the constant changes each time. */
 static unsigned hashed(unsigned word, unsigned *constant, unsigned factor) {
     unsigned mixed = word ^ *constant;
     return folded(mixed * (*constant *= factor));
@@ -20,7 +20,7 @@ static void advance_generator(Generator *g) {
     g->state = g->state * factor + g->step;
 }
 
-/* Seed a generator with a whole number or several, as words of 32 bits, the lowest first. */
+/* Seed a generator with one or several whole numbers, as words of 32 bits, the lowest first. */
 void seed_generator(Generator *g, const unsigned *words, int count) {
     unsigned pool[POOL], constant = 0x43b0d7e5;
     for (int n = 0; n < POOL; n++) pool[n] = hashed(n < count ? words[n] : 0, &constant, 0x931e8875);
@@ -43,7 +43,7 @@ void seed_generator(Generator *g, const unsigned *words, int count) {
     advance_generator(g);
 }
 
-/* A number from `low` to `high`. */
+/* A number from `low` to `high`, uniformly distributed. */
 double draw_uniform(Generator *g, double low, double high) {
     advance_generator(g);
     Word word = (Word)(g->state >> 64) ^ (Word)g->state;

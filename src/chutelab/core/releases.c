@@ -1,37 +1,37 @@
-/* Where, when and how fast each particle starts. */
+/* Where, when and how fast each particle is released. */
 
 #include <string.h>
 #include "releases.h"
 
-/* Draws of a height that may overlap an earlier particle before it has to wait for its place. */
+/* Greatest number of draws of a height; the last one is kept even if it overlaps, and the release waits. */
 #define TRIES 1000
-/* Distance of neighbours in a packed box, in radii of the largest. */
+/* Distance of neighbours in a packed box, in radii of the largest particle. */
 #define PITCH 2.04
-/* How far a place in it is moved at random each way, in the same unit: no pile is that even. */
+/* Random shift of each place in both directions, in the same unit: no real pile is perfectly even. */
 #define JITTER 0.01
-/* Places of a box that are looked at together; what is above the particles never is. */
+/* Number of places of a box that are checked together; places above the last particle are never checked. */
 #define HANDFUL 1024
-/* Places of a box that are looked at, at most, and TRIES more for each particle. */
+/* Places of a box that are checked at most, and TRIES more for each particle. */
 #define LOOKS 1e6
-/* By how much cells are wider than what they are for, so that rounding leaves no neighbour out. */
+/* Factor by which cells are wider than necessary, so that rounding excludes no neighbour. */
 #define WIDER 1.001
 
 Drawing D;
 static Generator generator;
 
-/* The stream that is drawn. */
+/* The stream that is being drawn. */
 static Tables tables;
 static const StreamKeys *stream;
 static const ParticleKeys *particle;
 static Start *starts;
 static int count, rides, carried;
-static double belt_x, belt_y; /* the way the belt runs, for what is released on it; else square to gravity */
+static double belt_x, belt_y; /* direction of the belt, for a stream released on it; else perpendicular to gravity */
 
 static Place handful[HANDFUL];
 
 EXPORT Drawing *drawing(void) { return &D; }
 
-/* Lay out what is drawn into. */
+/* Reserve the arrays of the drawing. */
 void lay_out_drawing(void) {
     Tables t = tables_of(0);
     double corners = 0.0, beds = 0.0;
@@ -67,7 +67,7 @@ static void seed_stream(int number) {
 
 static double draw_share(void) { return draw_uniform(&generator, 0.0, 1.0); }
 
-/* Draw radii from the range of the kind; the first has the mean. */
+/* Draw radii from the range of the kind; the first particle has the mean. */
 static void draw_radii(void) {
     if (isnan(particle->span[0])) return;
     for (int i = 0; i < count; i++)
@@ -75,7 +75,7 @@ static void draw_radii(void) {
     starts[0].radius = particle->radius;
 }
 
-/* Draw heights, which are kept in `position[1]` at first, and speeds; the first one has no spread. */
+/* Draw heights, which are kept in `position[1]` at first, and speeds; the first particle has no spread. */
 static void draw_spread(double vx, double vy) {
     double speed = length_of(vx, vy), x = 1.0, y = 0.0;
     if (speed > 0.0) x = vx / speed, y = vy / speed;
@@ -89,7 +89,7 @@ static void draw_spread(double vx, double vy) {
     }
 }
 
-/* Draw velocities of a gas: normal in both directions (G. E. P. Box, M. E. Muller, 1958). */
+/* Draw velocities of a gas: normally distributed in both directions (G. E. P. Box, M. E. Muller, 1958). */
 static void draw_gas(void) {
     for (int i = 0; i < count && stream->speed_spread > 0.0; i++) {
         double size = stream->speed_spread * sqrt(-2.0 * log(1.0 - draw_share())), x, y;
@@ -99,7 +99,7 @@ static void draw_gas(void) {
     }
 }
 
-/* Draw all that is independent of the other particles. */
+/* Draw all that doesn't depend on other particles. */
 static void begin_stream(void) {
     double velocity[2];
     stream = tables.streams + D.stream;
@@ -148,8 +148,8 @@ static int *cell_of(double column, double row) {
 
 static void empty_cells(void) { memset(D.heads, 0xff, (unsigned long)D.head_room * sizeof(int)); }
 
-/* Whether a particle at that height would be away from those nearby, listed by rows of a height that
-   reaches as far as they do. */
+/* Whether a particle at a height would overlap none of those nearby. These are listed in rows, whose height is their
+   greatest reach. */
 static int is_free(double height, double row_height) {
     double row = floor(height / row_height);
     for (int n = -1; n <= 1; n++)
@@ -161,7 +161,7 @@ static int is_free(double height, double row_height) {
     return 1;
 }
 
-/* Draw heights until one is free; after TRIES the last one is kept as it is. */
+/* Draw heights until one is free; after TRIES draws the last one is kept. */
 static double free_height(double diameter) {
     double height = 0.0, row_height = WIDER * diameter;
     for (int k = 0; k < D.near_count; k++) {
@@ -177,12 +177,12 @@ static double free_height(double diameter) {
     return height;
 }
 
-/* Redraw heights so that no particle starts inside one released before it.
+/* Redraw heights so that no particle overlaps one released before it.
 
-   If no height is free, the last draw is kept, and the release is delayed. Earlier particles are taken
-   to have moved on at their release velocity, seen from the belt, and to have fallen freely, but not
-   below the lowest layer if they ride. Those nearby may still be in the way: what has moved on by a
-   diameter, or has fallen below the bed by one, stays away for good. */
+   If no height is free, the last draw is kept, and the release is delayed. Earlier particles are assumed to have moved at
+   their release velocity relative to the belt, and to have fallen freely, but riders not below the lowest layer. A
+   particle stays in the list as long as it may be in the way: one that has moved on by a diameter, or has fallen below
+   the bed by one, will not come back. */
 static int spread_apart(void) {
     double diameter = 0.0, fall = carried ? 0.0 : 0.5 * tables.scene->gravity;
     double lowest = rides ? 0.0 : -INFINITY;
@@ -229,7 +229,7 @@ static void place_stream(void) {
     }
 }
 
-/* Sort the particles of the streams before into cells of a grid, of the size that is returned. */
+/* Sort the particles of earlier streams into cells of a grid; return the size of a cell. */
 static double sort_earlier(double largest) {
     Start *first = D.starts + (long)D.member * D.count;
     double size = 0.0;
@@ -244,7 +244,7 @@ static double sort_earlier(double largest) {
     return size;
 }
 
-/* Mark the places of a handful that are in particles of the streams before. */
+/* Mark the places of a handful that overlap particles of earlier streams. */
 static void take_what_is_in_others(int many, double largest) {
     const Start *first = D.starts + (long)D.member * D.count;
     for (Place *p = handful; p < handful + many; p++) {
@@ -294,7 +294,7 @@ static int pour(void) {
     return 1;
 }
 
-/* Draw a stream on: 1 if it is done. */
+/* Continue to draw a stream; return 1 when it is done. */
 static int draw_stream(void) {
     starts = D.starts + (long)D.member * D.count + D.first;
     if (!D.is_begun) begin_stream();
@@ -308,7 +308,7 @@ static int draw_stream(void) {
     return 1;
 }
 
-/* Draw on, for about `looks`: DONE, or PAUSED. */
+/* Continue to draw for about `looks` checks; return DONE or PAUSED. */
 EXPORT int draw(void) {
     D.left = D.looks;
     for (; D.member < P.members; D.member++, D.stream = D.first = 0) {

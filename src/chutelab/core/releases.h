@@ -1,4 +1,4 @@
-/* What the files share that draw releases: the drawing, a line a function. */
+/* What the files that draw releases share: the drawing, and their functions. */
 
 #ifndef RELEASES_H
 #define RELEASES_H
@@ -6,7 +6,7 @@
 
 extern Drawing D;
 
-/* A place that a disk may be put to. */
+/* A place where a disk may be put. */
 typedef struct { double x, y; int taken; } Place;
 
 /* random.c */

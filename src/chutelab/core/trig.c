@@ -1,20 +1,20 @@
-/* Sine, cosine and their inverses of + - * / and square roots alone: the same bits everywhere.
+/* Sine, cosine and their inverses by + - * / and square roots alone: the same bits everywhere.
 
-   Those of libraries differ in the last bit from one to another, and JavaScript's are not NumPy's.
-   The polynomials are those of fdlibm (Sun Microsystems, 1993), which are free to use. */
+   Those of libraries differ in the last bit from one to another, and JavaScript's are not NumPy's. The polynomials are
+   those of fdlibm (Sun Microsystems, 1993), which are free to use. */
 
 #include "trig.h"
 
 #define EXPORT __attribute__((visibility("default")))
 
-/* rad; beyond, pi/2 in three parts of 33 bits is no longer subtracted exactly. */
+/* rad; for larger angles, subtracting pi/2 in three parts of 33 bits is no longer exact. */
 #define LARGEST_ANGLE 1e6
-/* Adding and subtracting it rounds to a whole number. */
+/* Adding and subtracting this rounds to a whole number. */
 #define ROUND 6755399441055744.0 /* 1.5 * 2^52 */
 
 #define QUARTERS 6.36619772367581382433e-01 /* 2/pi */
 
-/* Angles and what their doubles lack: the arc tangent of 1/2, pi/4, pi/2 and pi. */
+/* Angles, each with what its double lacks: the arc tangent of 1/2, pi/4, pi/2 and pi. */
 static const double HALF[] = { 4.63647609000806093515e-01, 2.26987774529616870924e-17 };
 static const double EIGHTH[] = { 7.85398163397448278999e-01, 3.06161699786838301793e-17 };
 static const double QUARTER[] = { 1.57079632679489655800e+00, 6.12323399573676603587e-17 };
@@ -34,15 +34,14 @@ static const double A[] = { 3.33333333333329318027e-01, -1.99999999998764832476e
     -7.69187620504482999495e-02, 6.66107313738753120669e-02, -5.83357013379057348645e-02,
     4.97687799461593236017e-02, -3.65315727442169155270e-02, 1.62858201153657823623e-02 };
 
-/* Sine and cosine of an angle (rad), each to less than 1 unit in the last place; NaN of those
-   beyond LARGEST_ANGLE. */
+/* Sine and cosine of an angle (rad), each to less than 1 unit in the last place; NaN beyond LARGEST_ANGLE. */
 void sin_cos(double angle, double *sine, double *cosine) {
     if (!(fabs(angle) <= LARGEST_ANGLE)) {
         *sine = *cosine = NAN;
         return;
     }
     double turns = (angle * QUARTERS + ROUND) - ROUND;
-    /* The rest, as the sum of x and a tail, without its first digits cancelling away. */
+    /* The remainder as the sum of x and a tail, so that cancellation loses no digits. */
     double first = angle - turns * PART[0];
     double second = first - turns * PART[1];
     double lost = (first - second) - turns * PART[1];
@@ -76,8 +75,8 @@ EXPORT double cosine(double angle) {
     return across;
 }
 
-/* The angle of a finite vector from the x axis, rad, more than -pi and at most pi, to 1.5 units in
-   the last place. The sign of a zero does not matter, and the vector (0, 0) has the angle 0. */
+/* The angle of a finite vector from the x axis, rad, above -pi and up to pi, to 1.5 units in the last place. The sign of
+   a zero doesn't matter, and the vector (0, 0) has the angle 0. */
 EXPORT double angle_of(double y, double x) {
     double up = fabs(y), across = fabs(x);
     int steep = up > across, back = x < 0.0;
@@ -97,7 +96,7 @@ EXPORT double angle_of(double y, double x) {
     return y < 0.0 ? -turned : turned;
 }
 
-/* The angle from 0 to pi (rad) of a cosine, to 2.5 units in the last place, or NaN. */
+/* The angle from 0 to pi (rad) that has a cosine, to 2.5 units in the last place, or NaN. */
 EXPORT double angle_of_cosine(double cosine) {
     return angle_of(sqrt((1.0 - cosine) * (1.0 + cosine)), cosine);
 }

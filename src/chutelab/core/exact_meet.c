@@ -13,8 +13,12 @@
 #define GLANCING 1e-3
 /* Least order with which a circle is left for good, unless the pull turns a path back. */
 #define FROM_CURVE 2
-/* Bound on the refinements of a root: Newton's method takes about 8, a double root by halving this. */
+/* Bound on the refinements of a root: Newton's method takes about 8, by halving alone this. */
 #define REFINEMENTS 120
+/* Halvings of a time, past its last bit, and descents of a polynomial of degree 4: it has two, and by rounding
+   another one or two. */
+#define HALVINGS 52
+#define MOST_ROOTS 4
 /* rad; an obstacle this close to the present angle is met now: by rounding it may be passed. */
 #define NOW 2e-11
 /* In `touch`; circles whose centres and radii differ by no more are in one place. */
@@ -40,66 +44,64 @@ double polynomial(const double *c, int count, double t) {
     return value;
 }
 
-/* Where a polynomial, monotonic between low and high, changes sign, or `high`: Newton's method inside a
-   shrinking bracket, halving where it would leave it. */
-static double crossing(const double *c, int count, double low, double high) {
-    double at_low = polynomial(c, count, low), at_high = polynomial(c, count, high), slope[4];
-    double sign = at_high < at_low ? 1.0 : -1.0;
-    if (!(sign * at_high < 0.0 && sign * at_low > 0.0)) return sign * at_low <= 0.0 ? low : high;
-    for (int n = 1; n < count; n++) slope[n - 1] = c[n] * n;
+/* Where a polynomial of degree 4 that is positive at `low` and negative at `high`, but for rounding, and crosses
+   zero once between is zero: Newton's method inside a shrinking bracket, halving where it would leave it. */
+static double crossing(const double *c, double low, double high) {
+    if (!(polynomial(c, 5, low) > 0.0)) return low;
+    if (!(polynomial(c, 5, high) < 0.0)) return high;
     double t = 0.5 * (low + high);
     for (int n = 0; n < REFINEMENTS; n++) {
-        double value = sign * polynomial(c, count, t);
-        double rate = sign * polynomial(slope, count - 1, t);
+        double value = 0.0, rate = 0.0, old = t;
+        for (int k = 4; k >= 0; k--) rate = rate * t + value, value = value * t + c[k];
         if (value >= 0.0) low = t;
         else high = t;
-        double newton = t - value / rate, old = t;
+        double newton = t - value / rate;
         t = newton > low && newton < high ? newton : value == 0.0 ? t : 0.5 * (low + high);
         if (fabs(t - old) <= 0.5 * ULP * fabs(old)) break;
     }
     return t;
 }
 
-/* Find each t, 0 < t <= until, where a polynomial of degree up to 4 becomes negative, in their order;
-   infinite where there is none. The stationary points of each derivative split the time axis into
-   pieces on which the next one down is monotonic, so no root is missed or mistaken for another.
-   Touching zero without crossing is not a contact. */
+/* Find where a polynomial of degree 4 becomes negative from `low` to `high`, in order; returns how many such t were
+   found by then. Its Bernstein coefficients there change sign as often as it has roots, or two or four times more:
+   what may have several is halved. */
+static int isolate(const double *c, const double *bernstein, double low, double high, int halvings, double *found,
+                   int count) {
+    double left[5], right[5];
+    int below = bernstein[0] < 0.0, changes = 0;
+    for (int n = 1; n < 5; n++) changes += (bernstein[n] < 0.0) != (bernstein[n - 1] < 0.0);
+    if (changes == 0 || (changes == 1 && below) || !halvings || count == MOST_ROOTS) return count;
+    if (changes == 1) {
+        found[count] = crossing(c, low, high);
+        return count + 1;
+    }
+    /* Coefficients of both halves, after de Casteljau. */
+    for (int n = 0; n < 5; n++) right[n] = bernstein[n];
+    for (int n = 0; n < 5; n++) {
+        left[n] = right[0];
+        for (int k = 0; k < 4 - n; k++) right[k] = 0.5 * (right[k] + right[k + 1]);
+    }
+    double middle = 0.5 * (low + high);
+    count = isolate(c, left, low, middle, halvings - 1, found, count);
+    return isolate(c, right, middle, high, halvings - 1, found, count);
+}
+
+/* Find each t, 0 <= t <= until, where a polynomial of degree up to 4 becomes negative, in their order; infinite where
+   there is none. Touching zero without crossing is not a contact. */
 static void descents(const double *c, double until, double *found) {
     static const double BERNSTEIN[5][5] = { { 1.0 }, { 1.0, 0.25 }, { 1.0, 0.5, 1.0 / 6.0 },
         { 1.0, 0.75, 0.5, 0.25 }, { 1.0, 1.0, 1.0, 1.0, 1.0 } };
-    double scaled[5], power = 1.0, derivatives[4][5], knots[6] = { 0.0, until };
-    int below = 0, count = 2;
-    for (int n = 0; n < 5; n++, power *= until) scaled[n] = c[n] * power, derivatives[0][n] = c[n];
-    for (int n = 0; n < 4; n++) found[n] = INFINITY;
-    /* A polynomial lies above the smallest of its Bernstein coefficients. */
-    for (int j = 0; j < 5; j++) {
-        double sum = 0.0;
-        for (int i = 0; i <= j; i++) sum += BERNSTEIN[j][i] * scaled[i];
-        below |= sum < 0.0;
-    }
-    if (!below) return;
-    for (int k = 1; k < 4; k++)
-        for (int n = 1; n < 6 - k; n++) derivatives[k][n - 1] = derivatives[k - 1][n] * n;
-    for (int k = 3; k > 0; k--) {
-        double next[6] = { 0.0 };
-        for (int n = 1; n < count; n++) next[n] = crossing(derivatives[k], 5 - k, knots[n - 1], knots[n]);
-        next[count++] = until;
-        for (int n = 0; n < count; n++) knots[n] = next[n];
-    }
-    /* At 0 it may be 0 and go either way. */
-    int before = c[0] < 0.0;
-    for (int n = 0; n < 4; n++) {
-        int after = polynomial(c, 5, knots[n + 1]) < 0.0;
-        if (after && !before) found[n] = crossing(c, 5, knots[n], knots[n + 1]);
-        before = after;
-    }
+    double bernstein[5] = { 0.0 }, power = 1.0;
+    for (int n = 0; n < MOST_ROOTS; n++) found[n] = INFINITY;
+    for (int n = 0; n < 5; n++, power *= until)
+        for (int j = n; j < 5; j++) bernstein[j] += BERNSTEIN[j][n] * (c[n] * power);
+    isolate(c, bernstein, 0.0, until, HALVINGS, found, 0);
 }
 
 static double first_descent(const double *c, double until) {
-    double found[4], first = INFINITY;
+    double found[MOST_ROOTS];
     descents(c, until, found);
-    for (int n = 0; n < 4; n++) first = MIN(first, found[n]);
-    return first;
+    return found[0];
 }
 
 /* Whether a direction from the centre of a circle is one of its arc. */
@@ -230,9 +232,9 @@ static double enter(const Motion *m, int k, double until) {
     const Obstacle *o = O.all + k;
     double first = INFINITY, dx = m->x - o->x, dy = m->y - o->y;
     for (int end = 1; end >= 0; end--) {
-        double turn = end ? 1.0 : -1.0, up, across;
-        sin_cos(end ? o->begin : o->begin + o->extent, &up, &across);
-        double ax = turn * up, ay = -turn * across;
+        /* The direction from the centre to the end, and that out of the arc there. */
+        const Tip *tip = O.tips + 2 * (O.faces + (k - O.first_arc) % O.arcs) + end;
+        double across = tip->left[0], up = tip->left[1], ax = tip->out[0], ay = tip->out[1];
         double ahead = has_edge(m->joint, k, end) ? 0.0 : ax * dx + ay * dy;
         double time = descent(ahead, ax * m->vx + ay * m->vy, ax * m->ax + ay * m->ay);
         if (!(time > 0.0 && time < until)) continue;
@@ -286,9 +288,9 @@ static double meet_circle(const Motion *m, int k, double until) {
     double t = INFINITY;
     /* Else it is past it for good, or never approaching it: no contact to find. */
     if ((gap[0] >= 0.0 || rises) && falls) {
-        double found[4];
+        double found[MOST_ROOTS];
         descents(gap, until, found);
-        for (int n = 3; n >= 0; n--) {
+        for (int n = MOST_ROOTS - 1; n >= 0; n--) {
             double s = found[n];
             if (!isfinite(s) || !counts(m, k, s)) continue;
             t = s;

@@ -38,7 +38,12 @@ static Series phi, w, z, work, heat, twist, normal, force, couple;
 static Series gauges[GAUGES];
 static int tells[GAUGES], gauge_count;
 
-static double at_time(const double *c, double t) { return polynomial(c, ORDER + 1, t); }
+/* A series at a time, its even and its odd terms at once. */
+static double at_time(const double *c, double t) {
+    Two sum = { c[ORDER], 0.0 };
+    for (int n = ORDER - 2; n >= 0; n -= 2) sum = sum * (t * t) + (Two){ c[n], c[n + 1] };
+    return sum[0] + t * sum[1];
+}
 
 /* Whether a series stays at 0 or above up to a time, whose powers are given, as the sum of what its terms can take
    off is less than the first one. */
@@ -60,6 +65,7 @@ static void expand(const Circle *c) {
     double lever = 1.0 / c->share - 1.0, up, across;
     double stick = !gripping ? 0.0 : held ? -1.0 : -c->share;
     double load = !gripping ? -c->slip * c->friction : rolls ? c->share * lever * c->roll * c->rolling : 0.0;
+    double bend = 1.0 / c->rho;
     sin_cos(c->phi, &up, &across);
     turns[0] = (Two){ across, up };
     phi[0] = c->phi, w[0] = c->w, z[0] = c->z;
@@ -68,24 +74,26 @@ static void expand(const Circle *c) {
     spin[0] = held ? 0.0 : c->z - c->turn;
     for (int n = 0; n <= ORDER; n++) {
         Two products = { 0.0, 0.0 }, turning = { 0.0, 0.0 };
-        double next = n + 1;
-        phi[n + 1] = w[n] / c->rho / next;
-        rate[n] = next * phi[n + 1];
+        double part = 1.0 / (n + 1);
+        rate[n] = w[n] * bend;
+        phi[n + 1] = rate[n] * part;
         moved[n] = (Two){ w[n], slip[n] };
-        for (int i = 0; i < n; i++) products += forced[i] * moved[n - i], turning += rate[i] * turns[n - i];
+        /* What is known since the last term comes last: the rest is summed meanwhile. */
+        for (int i = 1; i < n; i++) products += forced[i] * moved[n - i], turning += rate[i] * turns[n - i];
+        if (n) products += forced[0] * moved[n], turning += rate[0] * turns[n];
         turning += rate[n] * turns[0];
-        normal[n] = c->gravity * turns[n][0] - (products[0] + w[n] * w[0]) / c->rho;
+        normal[n] = c->gravity * turns[n][0] - (products[0] + w[n] * w[0]) * bend;
         force[n] = stick * c->gravity * turns[n][1] + load * normal[n];
         couple[n] = !rolls ? 0.0 : held ? -force[n] : -c->roll * c->rolling * normal[n];
         forced[n] = (Two){ w[n], force[n] };
         double rubbed = products[1] + force[n] * slip[0];
         for (int i = 0; i <= n && rolls; i++) rubbed += couple[i] * spin[n - i];
-        w[n + 1] = (c->gravity * turns[n][1] + force[n]) / next;
-        z[n + 1] = lever * (force[n] + couple[n]) / next;
-        turns[n + 1] = (Two){ -turning[1], turning[0] } / next;
-        work[n + 1] = force[n] / next;
-        heat[n + 1] = -rubbed / next;
-        twist[n + 1] = couple[n] / next;
+        w[n + 1] = (c->gravity * turns[n][1] + force[n]) * part;
+        z[n + 1] = lever * (force[n] + couple[n]) * part;
+        turns[n + 1] = (Two){ -turning[1], turning[0] } * part;
+        work[n + 1] = force[n] * part;
+        heat[n + 1] = -rubbed * part;
+        twist[n + 1] = couple[n] * part;
         slip[n + 1] = gripping ? 0.0 : w[n + 1] + z[n + 1];
         spin[n + 1] = z[n + 1];
     }
@@ -157,7 +165,9 @@ static double first_negative(const double *c, double low, double high) {
     for (int n = 0; n < STEPS && t > low && t < high; n++) {
         double value = 0.0, slope = 0.0;
         for (int k = ORDER; k >= 0; k--) slope = slope * t + value, value = value * t + c[k];
+        double old = t;
         t -= value / slope;
+        if (t == old) break;
     }
     double ends[] = { t - NEAR * t, t + NEAR * t };
     for (int n = 0; n < 2; n++) {

@@ -113,6 +113,7 @@ inclined-conveyor | stream.count=1 | incoming.speed=1.5:2.5:4 incoming.incline_d
 spoon | stream.count=7 | surface.spoon.center[0]=0.9:1.2:4 stream.bed_height=0,0.02 particle.radius=0.002:0.006:3
 stream | stream.interact=false stream.count=5 particle.radius=[0.002,0.004] | plate.angle_deg=-60:40:5 stream.rate=50,200
 stream-independent | stream.count=6 stream.speed_spread=0.1 incoming.friction=0.5 | particle.mass=0.01:0.1:3 incoming.speed=1,3
+cascade | stream.count=6 stream.bed_height=0.3 run.until=2.2 | conveyor.middle.speed=-2,0,1 plate[0].angle_deg=0,60 outgoing.length=0.1,2
 perpendicular | stream.count=3 run.until=0.5 | stream.rate=1,10,100 plate.restitution=0,0.5
 """  # noqa: E501
 """A scene, what is set, what is varied."""

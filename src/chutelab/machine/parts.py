@@ -265,31 +265,6 @@ class Machine:
         """Width of the bins in which lasting contacts are kept, s; 0 if they are not."""
         return 0.0 if self.family is not None else self.scene.run.stress or 0.0
 
-    def member(self, row: int) -> Machine:
-        """Return one of a family's machines: a family of that one, with surfaces as without one."""
-        assert self.family is not None
-        first = row * self.family.each
-        some = slice(first, first + self.family.each)
-
-        def own(part: Any, which: Any = first) -> dict[str, Any]:
-            """Return what of a part has an axis of particles."""
-            numbers = vars(part).items() if np.size(getattr(part, "surface", 0)) else ()
-            return {key: n[which] for key, n in numbers if np.ndim(n) and key != "surface"}
-
-        columns = {key: numbers[some] for key, numbers in self.family.columns.items()}
-        parts = {name: getattr(self, name) for name in ("segments", "arcs", "pulley")}
-        kind = np.zeros(self.family.each, dtype=np.int64)
-        ends: Any = np.broadcast_to(self.end_time, self.count)[some]
-        return replace(
-            self,
-            scenes=replace(self.family, columns=columns),
-            gravity=np.broadcast_to(self.gravity, self.count)[first].item(),
-            particle=self.particle.of(some),
-            releases=replace(self.releases, **{**own(self.releases, some), "kind": kind}),
-            end_time=ends,
-            **{name: part and replace(part, **own(part)) for name, part in parts.items()},
-        )
-
     @cached_property
     def loose(self) -> float:
         """By which tracks may be further off circles between two knots, as a share of the radius.

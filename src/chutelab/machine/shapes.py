@@ -63,11 +63,15 @@ class Pieces(ABC):
                 array.flags.writeable = False
 
     def of(self, which: Any) -> Self:
-        """Return some of the pieces, or one, of numbers instead of arrays, by their numbers."""
+        """Return some of the pieces, or one, of numbers instead of arrays, by their numbers.
+
+        One of a family is an array of those of its machines; what these have alike stays.
+        """
         own: dict[str, Any] = {}
         for field in fields(self):
             array, rest = getattr(self, field.name), (slice(None),) * (field.name in VECTORS)
-            own[field.name] = array[(..., which, *rest)][()]
+            several = np.ndim(array) > len(rest)
+            own[field.name] = array[(..., which, *rest)][()] if several else array
         return type(self)(**own)
 
     @property

@@ -38,7 +38,7 @@ HALVINGS = 24
 
 
 def fates(recording: Record) -> NDArray[Any]:
-    """Return what became of each particle, in words, (N,); each has one fate. Not of a family.
+    """Return what became of each particle, in words, (N,); each has one fate.
 
     ``on NAME``
         It touches a surface when its track ends, or lies on what does, or is carried by it in a
@@ -66,16 +66,16 @@ def fates(recording: Record) -> NDArray[Any]:
     if gone.any():
         said[particles[gone]] = _ways_out(recording, particles[gone], last["position"][gone])
     stays, places, until = (every[~gone] for every in (particles, last["position"], last["t"]))
-    there, names, moved = Places(recording), recording.surfaces[:-1], moving(machine)
-    order = sorted(names, key=lambda name: name not in moved)
+    there, names, moves = Places(recording), machine.surfaces, moving(machine)
     home = np.full(len(stays), -1)
     if machine.landing >= 0:
-        home[recording.ended_by("landed")[stays]] = order.index("outgoing")
-    for n, name in enumerate(order):
-        left = np.flatnonzero(home < 0)
-        if len(left):
-            lies = there.bare(stays[left], places[left], name, until[left])
-            home[left[lies]] = n
+        home[recording.ended_by("landed")[stays]] = machine.landing
+    for first in (True, False):
+        for n, name in enumerate(names):
+            left = np.flatnonzero((home < 0) & (moves[name][stays] == first))
+            if len(left):
+                lies = there.bare(stays[left], places[left], name, until[left])
+                home[left[lies]] = n
     if machine.interact:
         one, two = there.touching(stays, places, until)
         reached = -1
@@ -88,22 +88,40 @@ def fates(recording: Record) -> NDArray[Any]:
         # In its bed a particle is carried at its height, whatever it touches.
         rides = machine.releases.carried.copy()
         rides[recording.select(Kind.SEPARATION, surface="incoming")["particle"]] = False
-        home[rides[stays] & ~recording.ended_by("landed")[stays]] = order.index("incoming")
-    said[stays] = [f"on {order[n]}" if n >= 0 else "in the air" for n in home.tolist()]
+        home[rides[stays] & ~recording.ended_by("landed")[stays]] = names.index("incoming")
+    told = [*(f"on {name}" for name in names), "in the air"]
+    said[stays] = np.array(told, dtype=object)[home]
     return said
 
 
-def moving(machine: Machine) -> set[str]:
-    """Return the names of the belts: the outgoing one, and all surfaces that move."""
-    owners = {owner for p in machine.parts for owner in p.surface[p.speed != 0.0].tolist()}
-    return {machine.surfaces[owner] for owner in owners | {machine.landing} - {-1}}
+def moving(machine: Machine) -> dict[str, Bools]:
+    """Tell of each surface which particles' machines have it as a belt, (N,).
+
+    Belts are the outgoing one, and all surfaces that move.
+    """
+    return {
+        name: np.broadcast_to(
+            sum(((p.speed != 0.0) & (p.surface == owner)).any(axis=-1) for p in machine.parts)
+            + (owner == machine.landing)
+            > 0,
+            machine.count,
+        )
+        for owner, name in enumerate(machine.surfaces)
+    }
 
 
 def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
     """Return by which way particles have left the scene that end outside of it, (n, 2), m."""
     machine = recording.machine
-    corners = machine.corners if machine.corners.size else machine.releases.position
-    (left, _), (right, top) = corners.min(axis=0), corners.max(axis=0)
+
+    def box(points: Floats) -> list[Floats]:
+        """Return least and largest x and y of each one's machine, (n,) each."""
+        both = np.stack([points.min(axis=-2), points.max(axis=-2)], axis=-2)
+        return [*np.broadcast_to(both, (recording.count, 2, 2))[gone].reshape(-1, 4).T]
+
+    left, _, right, top = box(
+        machine.corners if machine.corners.size else machine.releases.position
+    )
     x, y = ends.T
     high = np.where((y > top) & (machine.gravity == 0.0), "flew above", "fell below")
     said = np.where(x < left, "fell left", np.where(x > right, "fell right", high)).astype(object)
@@ -113,24 +131,25 @@ def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
     met[touch["particle"]], when[touch["particle"]] = touch["surface"], touch["t"]
     others = recording.surface_index(PARTICLES)
     since = np.full(len(gone), -np.inf)
-    for name in sorted(moving(machine) - {"incoming"}):
+    for name, moves in sorted(moving(machine).items()):
+        if name == "incoming" or not moves[gone].any():
+            continue
         came = arrivals(recording, name)["t"][gone]
         own = recording.surface_index(name)
         elsewhere = (when[gone] > came) & ~np.isin(met[gone], (own, others))
-        carried = (came > since) & ~elsewhere
+        carried = moves[gone] & (came > since) & ~elsewhere
         since = np.where(carried, came, since)
         points: list[Floats] = []
         for part in machine.parts:
             mine = part.of(part.surface == own)
             points += mine.ends if isinstance(mine, Segments) else [0.5 * np.add(*mine.boxes)]
-        (first, low), (second, _) = (
-            edge(np.concatenate(points), axis=0) for edge in (np.min, np.max)
-        )
+        first, low, second, _ = box(np.concatenate(points, axis=-2))
         for n in np.flatnonzero(carried).tolist():
             track = recording.track(int(gone[n]))
-            above = np.flatnonzero(track["position"][:, 1] >= low)
+            above = np.flatnonzero(track["position"][:, 1] >= low[n])
             where = track["position"][above[-1] if len(above) else -1, 0]
-            said[n] = f"off {name} {'left' if where < 0.5 * (first + second) else 'right'}"
+            side = "left" if where < 0.5 * (first[n] + second[n]) else "right"
+            said[n] = f"off {name} {side}"
     return [str(one) for one in said]
 
 
@@ -208,10 +227,12 @@ class Places:
         knots, corners = recording.knots, recording.machine.corners
         self._pieces: dict[int, list[Pieces]] = {}
         self._movers = {mover.surface: mover for mover in recording.machine.movers}
-        kinds = recording.machine.releases.kind
-        self._outlines = [recording.machine.outlines[kind] for kind in kinds.tolist()]
-        self._cornered = np.array([one is not None for one in self._outlines], dtype=bool)
-        self._point = POINT * float(np.ptp(corners, axis=0).max()) if corners.size else 0.0
+        self._cornered = np.zeros(recording.count, dtype=bool)
+        for kind, outline in enumerate(recording.machine.outlines):
+            if outline is not None:
+                self._cornered |= recording.machine.releases.kind == kind
+        size = np.ptp(corners, axis=-2).max(axis=-1) if corners.size else 0.0
+        self._point = np.broadcast_to(POINT * size, recording.count)
         self._t0 = float(knots["t"].min(initial=0.0))
         self._span = 2.0 * (float(knots["t"].max(initial=0.0)) - self._t0) + 1.0
         self._keys = recording.owner * self._span + (knots["t"] - self._t0)
@@ -259,7 +280,8 @@ class Places:
 
         That is one edge of no length.
         """
-        corners, angle, some = self._outlines[particle], 0.0, self.recording
+        angle, some = 0.0, self.recording
+        corners = some.machine.outlines[some.machine.releases.kind[particle]]
         if corners is None:
             corners = np.zeros((1, 2))
         else:
@@ -285,9 +307,13 @@ class Places:
         times = np.broadcast_to(np.asarray(t, dtype=np.float64), gap.shape)
         written = places if mover is None else mover.at_rest(places, times)
         for piece in self._pieces[owner]:
+            # Of a family each has its own.
+            piece = piece if self.recording.family is None else piece.of(particles)
             gap = np.where(piece.there(t), np.minimum(gap, piece.gap(written)), gap)
         radius = self.radius[particles]
-        found = np.asarray(gap <= np.where(radius > 0.0, radius * (1.0 + TOUCH), self._point))
+        found = np.asarray(
+            gap <= np.where(radius > 0.0, radius * (1.0 + TOUCH), self._point[particles])
+        )
         for n in np.flatnonzero(found & self._cornered[particles]).tolist():
             edges = self.edges(int(particles[n]), places[n], float(times[n]))
             found[n] = False

@@ -13,7 +13,7 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any, Final
@@ -151,10 +151,11 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
     restless = ~missed & (ended != REASONS.index("settled"))
     if recording.machine.until != "settled":
         restless[:] = False
+    ways = fates(recording).reshape(missed.shape) if every > 1 and missed.any() else missed
     for row in np.flatnonzero((missed | restless).any(axis=1)).tolist():
         fate = FATES.get(REASONS[ended[row, 0]])
         if every > 1 and missed[row].any():
-            fate = told_fates(Counter(fates(member(recording, row))[missed[row]].tolist()))
+            fate = told_fates(Counter(ways[row, missed[row]].tolist()))
         found[REASON][row] = "; ".join(
             f"{f'{some.sum()} of {every} particles' if every > 1 else 'it'} {what}"
             for some, what in (
@@ -167,25 +168,6 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
             if some.any()
         )
     return found
-
-
-def member(recording: Recording, row: int) -> Recording:
-    """Return the recording of one of its variants."""
-    if (family := recording.family) is None:
-        return recording
-    first, last = row * family.each, (row + 1) * family.each
-    offsets = recording.offsets[first : last + 1]
-    events = recording.events[recording.events["particle"] // family.each == row]
-    events["particle"] -= first
-    return replace(
-        recording,
-        machine=recording.machine.member(row),
-        knots=recording.knots[offsets[0] : offsets[-1]],
-        offsets=offsets - offsets[0],
-        ended=recording.ended[first:last],
-        events=events,
-        by_surface=recording.by_surface[first:last],
-    )
 
 
 LONGEST: Final = 6

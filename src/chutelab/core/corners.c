@@ -1,57 +1,59 @@
-/* Particles with corners: convex polygons, boxes among them.
+/* Particles with corners: convex polygons, among them boxes.
 
-   What touches is a corner of one on an edge of the other, or of a particle on a surface, or an end of a surface on an
-   edge; so edge on edge are two places. Each is a contact of its own with levers about the centres. A disk and a rim
-   are a corner with a radius. Gaps are of the corner as it turns: a flight is exact, and a blow is at the instant at
-   which the first gap closes. */
+   A contact is at one place: a corner of one particle on an edge of the other, a corner on a surface, or an end of a
+   surface on an edge; so two edges that lie on each other touch at two places. Each place is a contact of its own, with
+   levers about the centres. A disk, or an arc seen from outside, counts as a corner with a radius. Gaps are those of the
+   corner on its exact path with rotation, and an impact is at the instant at which the first gap closes. */
 
 #include <string.h>
 #include "core.h"
 #include "trig.h"
 
-/* Strides of a span in which gaps are looked at, at least: a touch that comes and goes within one is left to the
+/* Least number of steps in which gaps are checked over a span. A contact that begins and ends within one is left to the
    next step. */
 #define STRIDES 8
-/* rad; what turns by more in a span may leave something round by one corner and meet it by the next. */
+/* rad; a particle that rotates by more in a span may leave something round by one corner and meet it with the next. */
 #define ROLLS 0.05
-/* Halvings to the instant of a blow, to its last bit. */
+/* Greatest number of iterations to the instant of an impact; bisections reach its last bit ... */
 #define TO_ROOT 200
-/* ... and quicker steps before them. */
+/* ... and the number of faster steps before them. */
 #define QUICK 20
-/* Cosine of an angle between edge and surface from which on a corner near its end counts as on it. */
+/* Cosine of the angle between edge and surface; with a larger one, a corner near the end of a surface is on it. */
 #define FLAT 0.9
-/* Share of what counts as near: what is inside by less may be so by rounding. */
+/* Share of what counts as near; a smaller overlap may be rounding. */
 #define DEEP 0.2
-/* ... and past an end. */
+/* The same for a place beyond an end. */
 #define ROUNDED 1e-6
-/* Sweeps of a blow at several places, and of its size, at which they end; those after which it is first solved at once. */
+/* Greatest number of sweeps over the places of an impact, the share of its size at which they end, and the number of
+   sweeps before the first direct solve. */
 #define SWEEPS 2000
 #define ENDS 1e-15
 #define DIRECT 4
-/* Of what an impulse changes at its own place: less is left by rounding where two of them do the same. */
+/* Share of a diagonal element of the matrix; a smaller pivot is rounding, where two impulses have the same effect. */
 #define SAME 1e-6
-/* Of the velocity that an impulse would change if there were no joints: what is less, they hold. */
+/* Share of the velocity that an impulse would change without joints; if it changes less, the joints hold the place. */
 #define HELD 1e-13
-/* Share of it that a blow may give by rounding. */
+/* Share of an impact's energy that it may gain by rounding. */
 #define GAINS 1e-12
-/* Of the radius inside, by which two in a crowd may move before the places at which they touch are looked up anew: by its
-   square the gap is off then. */
+/* Distance, in radii of the inner circle, by which two particles of a crowd may move before their places are looked up
+   again; the gap is then wrong by its square. */
 #define STILL 2e-4
-/* Candidates for a place: corners of both. */
+/* Candidates for places: corners of both. */
 #define CANDIDATES (2 * MOST_CORNERS)
 
-/* Something at a time. A segment has two points, an arc its ends and its centre, what is round its centre. */
+/* A particle or a surface at a time. A segment has two points, an arc its ends and its centre, something round its
+   centre. */
 typedef struct {
     double p[MOST_CORNERS][2];
-    double n[MOST_CORNERS][2]; /* of a polygon, unit vectors out of its edges */
-    double x, y, radius;    /* x, y: of a particle's centre */
-    const double *edges;    /* of a polygon, see `World.edges` */
+    double n[MOST_CORNERS][2]; /* of a polygon: unit vectors out of its edges */
+    double x, y, radius;    /* x, y: centre of a particle */
+    const double *edges;    /* of a polygon: see `World.edges` */
     const Surface *s;
-    int count, round;       /* points, of which one may have a radius, or -1 */
-    int facing;             /* of two polygons: the edge that most of the other is out of, see `are_apart` */
+    int count, round;       /* number of points; the one with a radius, or -1 */
+    int facing;             /* of two polygons: the edge that separates the other most, see `are_apart` */
 } Shape;
 
-/* Cosine and sine of the angle of a particle; of two angles each they are kept. */
+/* Cosine and sine of the angle of a particle, cached for two angles of each. */
 static const double *pose_of(int j, double turned, int later) {
     double *pose = W.poses + 6 * j + 3 * later;
     if (pose[0] == turned && pose[1] != pose[2]) return pose + 1;
@@ -61,7 +63,7 @@ static const double *pose_of(int j, double turned, int later) {
 }
 
 static Shape shape_of(int j, double t) {
-    /* What it does not have is not set. */
+    /* Only the fields that it has are set. */
     Shape out;
     out.round = -1;
     out.count = 0;
@@ -104,7 +106,7 @@ static Shape shape_of(int j, double t) {
     return out;
 }
 
-/* Unit vector out of an edge of a polygon, and its length. */
+/* Unit vector out of an edge of a polygon, and the length of the edge. */
 static double out_of(const Shape *a, int edge, double *n) {
     n[0] = a->n[edge][0];
     n[1] = a->n[edge][1];
@@ -115,7 +117,7 @@ static double off_edge(const Shape *a, int edge, const double *q) {
     return (q[0] - a->p[edge][0]) * a->n[edge][0] + (q[1] - a->p[edge][1]) * a->n[edge][1];
 }
 
-/* The edge that a point is furthest out of, and by how much. */
+/* The edge that a point is furthest outside of, and its distance from that edge, m. */
 static int furthest(const Shape *a, const double *q, double *off) {
     int found = 0;
     for (int n = 0; n < a->count; n++) {
@@ -127,7 +129,7 @@ static int furthest(const Shape *a, const double *q, double *off) {
     return found;
 }
 
-/* By how much all of a shape is out of an edge. */
+/* Distance of a whole shape outside of an edge, m; negative if it is partly inside. */
 static double clear_of(const Shape *a, int edge, const Shape *b) {
     double least = INFINITY;
     for (int n = 0; n < b->count; n++)
@@ -135,10 +137,11 @@ static double clear_of(const Shape *a, int edge, const Shape *b) {
     return least;
 }
 
-/* The edge that a corner of `b` is on: the one that it is furthest out of, and inside, or within `near`, the one that
-   most of `b` is out of: else what is deep by more than its corners are apart would be pressed aside. Of a surface
-   counts how it goes on from its end, by the radius of the circle inside `a`: so the edge that a corner leaves over the
-   end on is the one that it came on. */
+/* The edge that a corner of `b` is on. If the corner is outside of `a` by `near`, that is the edge that it is furthest
+   outside of. Else it is the edge that separates the two most: with another one, a particle that overlaps by more than
+   the distance of its corners would be pressed sideways. At an end of a surface, the line by which the surface continues
+   from there, as long as the inner radius of `a`, counts for that: so a corner that slides off the end stays on the edge
+   on which it came. */
 static int edge_under(const Shape *a, const Shape *b, const double *q, double near) {
     double off, best = -INFINITY, on = near / TOUCH;
     int found = furthest(a, q, &off);
@@ -165,11 +168,12 @@ static int edge_under(const Shape *a, const Shape *b, const double *q, double ne
     return found;
 }
 
-/* Whether two polygons are apart by more than that along an edge of the first; if not, note which is facing. */
+/* Whether two polygons are apart by more than `by` along an edge of the first one. If not, note the edge that separates
+   them most. */
 static int are_apart_along(Shape *a, const Shape *b, double by) {
     double best = -INFINITY;
     for (int e = 0; e < a->count; e++) {
-        /* All of a particle is out by less than its centre is. */
+        /* The particle as a whole is out by less than its centre is. */
         if (!b->s && off_edge(a, e, &b->x) < best) continue;
         double clear = clear_of(a, e, b);
         if (clear > by) return 1;
@@ -180,7 +184,7 @@ static int are_apart_along(Shape *a, const Shape *b, double by) {
     return 0;
 }
 
-/* Whether a polygon and something else are apart by more than that: along an edge of one, or within a rim. */
+/* Whether a polygon and something else are apart by more than `by`: along an edge of either, or inside an arc. */
 static int are_apart(Shape *a, Shape *b, double by) {
     if (are_apart_along(a, b, by)) return 1;
     if (!b->s) return b->round < 0 && are_apart_along(b, a, by);
@@ -195,8 +199,9 @@ static int are_apart(Shape *a, Shape *b, double by) {
     return by < b->radius && high < square(b->radius - by);
 }
 
-/* Fill in a place by its candidate, corners of `a` before points of `b`, and what that is on: an edge; a side of a
-   segment; the inside of a rim; of a point with a radius also -1 - a corner. */
+/* Fill in a place from its candidate `which` (corners of `a`, then points of `b`) and from what this is on: the number of
+   an edge; for a corner on a segment the side, 1 or -1; on an arc 0, the inside; for a point with a radius also -1 -
+   corner of `a`. */
 static void fill_in(const Shape *a, const Shape *b, Touch *t) {
     double n[2];
     if (t->which < a->count) {
@@ -238,9 +243,10 @@ static void fill_in(const Shape *a, const Shape *b, Touch *t) {
     t->ny = n[1];
 }
 
-/* The side of a segment that a corner is on: its own. Where the line from it to the centre, which is inside the shape,
-   crosses the segment, it has sunk through, and is on the side of the centre; so it is `near` an end where another goes
-   on to that side: what has sunk into two walls is beyond the end of each. */
+/* The side of a segment that a corner is on: usually its own. If the line from the corner to the centre, which is inside
+   the particle, crosses the segment, the corner has passed through, and its side is that of the centre. This also holds
+   up to `near` beyond an end at which another segment continues to that side, since a corner that overlaps two walls is
+   beyond the end of each. */
 static int side_of(const Shape *a, const Surface *s, int corner, double near) {
     double x = a->p[corner][0] - s->x, y = a->p[corner][1] - s->y, u = a->x - s->x, v = a->y - s->y;
     double off = y * s->tx - x * s->ty, mid = v * s->tx - u * s->ty, both = fabs(off) + fabs(mid);
@@ -252,8 +258,8 @@ static int side_of(const Shape *a, const Surface *s, int corner, double near) {
     return cut >= low && cut <= s->length + high ? centre : own;
 }
 
-/* Whether a point of a shape is inside the circle of an arc: on its own, or by the centre where the line to it, inside
-   the shape, crosses the arc. */
+/* Whether a point of a shape is inside the circle of an arc: its own position decides, or that of the centre if the line
+   between both, which is inside the shape, crosses the arc. */
 static int is_inside(const Shape *a, const Surface *s, double px, double py) {
     double x = px - s->x, y = py - s->y, u = a->x - s->x, v = a->y - s->y;
     double off = x * x + y * y - square(s->radius);
@@ -268,10 +274,11 @@ static int is_inside(const Shape *a, const Surface *s, double px, double py) {
     return s->shape == CIRCLE || x * s->tx + y * s->ty >= s->cos_half * s->radius ? centre : own;
 }
 
-/* By how much a corner may be past an end of a segment and on it: by rounding where the segment does not go on. */
+/* How far beyond an end of a segment a corner may be and still be on the segment: only rounding, unless the segment
+   continues smoothly. */
 static double past_end(const Surface *s, int end, double near) { return mate_of(s, end) < 0 ? ROUNDED * near : near; }
 
-/* Find what a candidate is on; 0 if it is none that touches. */
+/* Find what a candidate is on, and fill in its place; return 0 if it doesn't touch there. */
 static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
     double off, n[2];
     if (t->which < a->count) {
@@ -325,25 +332,25 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
 
 double inner_of(int i, int j) { return j < 0 ? W.disks[i].inner : MIN(W.disks[i].inner, W.disks[j].inner); }
 
-/* List the places at which a polygon is nearer than `within` to something else, up to MOST_TOUCHES. */
-static int list_between(Shape *a, Shape *b, double near, double within, Touch *list) {
+/* List the places at which a polygon and another shape have a gap below `within`, up to MOST_TOUCHES. */
+static int list_places_of(Shape *a, Shape *b, double near, double within, Touch *list) {
     int count = 0, both = !b->s && b->round < 0;
     if (are_apart(a, b, within + near)) return 0;
     for (int c = 0; c < a->count + b->count && count < MOST_TOUCHES; c++) {
         Touch *now = list + count;
         now->which = c;
-        /* Whichever edge it is on, it is out of that by as much. */
+        /* On any edge its gap is at least as large. */
         if (both && (c < a->count ? off_edge(b, b->facing, a->p[c]) : off_edge(a, a->facing, b->p[c - a->count])) > within)
             continue;
         if (!find_place(a, b, near, now) || now->gap > within) continue;
-        /* Beside corners of both particles it may be inside by another edge than the one that they are apart by. */
+        /* Near corners of both particles it may be inside by another edge, although the particles are apart. */
         if (!b->s && now->gap < -DEEP * near && are_apart(a, b, 0)) continue;
         int known = 0;
         for (int n = 0; n < count && c >= a->count; n++) {
             if (length_of(list[n].x - now->x, list[n].y - now->y) > near) continue;
             if (c - a->count == b->round && list[n].nx * now->nx + list[n].ny * now->ny <= FLAT) continue;
             known = 1;
-            /* A corner that slides off an end leaves by its edge. */
+            /* A corner that slides off an end leaves on the edge that is on the end. */
             if (b->s && b->round < 0 && now->gap <= 0) list[n] = *now;
         }
         count += !known;
@@ -352,17 +359,17 @@ static int list_between(Shape *a, Shape *b, double near, double within, Touch *l
     return count;
 }
 
-/* The same of particle i, which has corners, and j at t; and what the gaps of the places are at `later`. */
+/* The same for particle i, which has corners, and j at t; and the gaps of the places at `later`. */
 RARELY int list_touches(int i, int j, double t, double within, double later, Touch *list) {
     double near = TOUCH * inner_of(i, j);
     Shape a = shape_of(i, t), b = shape_of(j, t);
-    int count = list_between(&a, &b, near, within, list);
+    int count = list_places_of(&a, &b, near, within, list);
     if (!(later > t) || !count) return count;
     a = shape_of(i, later);
     b = shape_of(j, later);
     for (int n = 0; n < count; n++) {
         Touch then = list[n];
-        /* What is round may go on round a corner. */
+        /* Something round may move round a corner meanwhile. */
         if (then.which - a.count == b.round) find_place(&a, &b, near, &then);
         else fill_in(&a, &b, &then);
         list[n].later = then.gap;
@@ -370,8 +377,9 @@ RARELY int list_touches(int i, int j, double t, double within, double later, Tou
     return count;
 }
 
-/* By how much a shape is clear of the circle of an arc, or of what is between its ends from an edge's side, m. */
-static double clear_of_bow(const Shape *a, const Surface *s) {
+/* Distance between a shape and an arc, m, by separating axes: the circle of the arc, or the edges of the shape from the
+   part between the arc's ends. Negative if they overlap. */
+static double clear_of_arc(const Shape *a, const Surface *s) {
     double far = 0, near = INFINITY, n[2], out;
     const double centre[2] = {s->x, s->y};
     for (int e = 0; e < a->count; e++) {
@@ -392,8 +400,8 @@ static double clear_of_bow(const Shape *a, const Surface *s) {
     return clear;
 }
 
-/* By how much a particle with corners, as it is at t and moved to a place, is clear of a surface, m: along the best of
-   all edges; below 0 it overlaps. */
+/* Distance between a particle with corners, as it is at t but moved to (x, y), and a surface, m, over all separating
+   axes; negative if they overlap. */
 RARELY double clear_of_corners(const Disk *d, double x, double y, int k, double t) {
     Shape a = shape_of((int)(d - W.disks), t), b = shape_of(-1 - k, t);
     double low = INFINITY, high = -INFINITY, clear;
@@ -401,7 +409,7 @@ RARELY double clear_of_corners(const Disk *d, double x, double y, int k, double 
         a.p[n][0] += x - a.x;
         a.p[n][1] += y - a.y;
     }
-    if (b.s->shape != SEGMENT) return clear_of_bow(&a, b.s);
+    if (b.s->shape != SEGMENT) return clear_of_arc(&a, b.s);
     for (int n = 0; n < a.count; n++) {
         double off = (a.p[n][1] - b.s->y) * b.s->tx - (a.p[n][0] - b.s->x) * b.s->ty;
         low = MIN(low, off);
@@ -412,7 +420,7 @@ RARELY double clear_of_corners(const Disk *d, double x, double y, int k, double 
     return clear;
 }
 
-/* Whether two particles, one with corners, would overlap by more than `deep`, the first at a place, both at t. */
+/* Whether two particles, one with corners, would overlap by more than `deep` at t with the first one moved to (x, y). */
 RARELY int would_overlap(int i, double x, double y, int j, double t, double deep) {
     Shape a = shape_of(i, W.disks[i].t), b = shape_of(j, t);
     double clear = -INFINITY;
@@ -433,14 +441,14 @@ RARELY int would_overlap(int i, double x, double y, int j, double t, double deep
     return clear < -deep;
 }
 
-/* Velocity of a particle's place at t, m/s. */
+/* Velocity of a particle at a place at t, m/s. */
 static void moves_at(const Disk *d, const Shape *a, double t, const Touch *at, double *v) {
     double h = t - d->t;
     v[0] = d->vx + W.gx * h - d->spin * (at->y - a->y);
     v[1] = d->vy + W.gy * h + d->spin * (at->x - a->x);
 }
 
-/* How fast a place closes at t, m/s. */
+/* Speed at which the gap at a place closes at t, m/s. */
 static double closes_at(int i, int j, const Shape *a, const Shape *b, double t, const Touch *at) {
     double u[3], v[3];
     moves_at(W.disks + i, a, t, at, u);
@@ -449,10 +457,11 @@ static double closes_at(int i, int j, const Shape *a, const Shape *b, double t, 
     return (v[0] - u[0]) * at->nx + (v[1] - u[1]) * at->ny;
 }
 
-/* Bound on the acceleration of a corner by turning, m/s2. */
+/* Bound on the centripetal acceleration of a corner, m/s2. */
 double whirl_of(const Disk *d) { return d->corners ? d->spin * d->spin * d->radius : 0; }
 
-/* Bound on the speed with which places of two come nearer within a span, m/s; INFINITY if they cannot meet in it. */
+/* Bound on the speed at which two approach each other at any place within a span, m/s; INFINITY if they cannot meet in
+   it. */
 RARELY double fastest_of(int i, int j, double t, double span) {
     const Disk *d = W.disks + i, *o = W.disks + MAX(j, 0);
     double h = t - d->t, x = d->x + (d->vx + 0.5 * W.gx * h) * h, y = d->y + (d->vy + 0.5 * W.gy * h) * h, nx, ny;
@@ -473,8 +482,8 @@ RARELY double fastest_of(int i, int j, double t, double span) {
     return speed + turns + fabs(o->spin) * o->radius;
 }
 
-/* The gap of a candidate: of a corner of a polygon or an end that by which it is out of all edges, of one on a segment
-   that on its side; of what is round that of the place where it is. */
+/* The gap of a candidate, m. For a corner of a polygon, or an end of a surface, its distance outside of all edges; for a
+   corner on a segment that on its side; for something round that at the place where it is. */
 static double gap_at(const Shape *a, const Shape *b, double near, Touch *at) {
     int m = at->which - a->count;
     if (m < 0 && b->round < 0 && !b->s) furthest(b, a->p[at->which], &at->gap);
@@ -484,8 +493,8 @@ static double gap_at(const Shape *a, const Shape *b, double near, Touch *at) {
     return at->gap;
 }
 
-/* The least gap that a corner of one polygon may have to the other within a span, from that which it has, at an edge of
-   one of them, at t: turning bends its way, by so much m/s2 at most. */
+/* Lower bound, m, of the gap that a corner of one polygon has to the other within a span, from its gap and speed at an
+   edge at t. The rotation of both accelerates it by at most `bends`, m/s2. */
 static double least_gap(int i, int j, const Shape *a, const Shape *b, double t, double span, double bends, Touch *at) {
     double off;
     at->on = at->which < a->count ? furthest(b, a->p[at->which], &off) : furthest(a, b->p[at->which - a->count], &off);
@@ -493,8 +502,8 @@ static double least_gap(int i, int j, const Shape *a, const Shape *b, double t, 
     return at->gap - (closes_at(i, j, a, b, t, at) + 0.5 * bends * span) * span;
 }
 
-/* The instant within (low, high] at which the gap of a candidate closes, from `above` 0 to `below`: by false position,
-   where an end that stays counts half (the Illinois rule), to the last bit. */
+/* The instant within (low, high] at which the gap of a candidate closes, from `above` 0 to `below`. False position with
+   the Illinois rule, which halves the value at an end that stays; then bisection to the last bit. */
 static double root_of(int i, int j, Touch *at, double low, double high, double above, double below) {
     double near = TOUCH * inner_of(i, j);
     for (int n = 0, side = 0; n < TO_ROOT && below < 0; n++) {
@@ -518,17 +527,17 @@ static double root_of(int i, int j, Touch *at, double low, double high, double a
     return high;
 }
 
-/* Whether a place at which two touch at t, when they are as that, closes faster than `soft`. */
+/* Whether a place at which two touch at t closes faster than `soft`. */
 static int closes_faster(int i, int j, Shape *a, Shape *b, double t, double within, double soft) {
     Touch places[MOST_TOUCHES];
-    int count = list_between(a, b, TOUCH * inner_of(i, j), within, places);
+    int count = list_places_of(a, b, TOUCH * inner_of(i, j), within, places);
     for (int n = 0; n < count; n++)
         if (closes_at(i, j, a, b, t, places + n) > soft) return 1;
     return 0;
 }
 
-/* The instant within (low, high] from which on a place at which two touch closes faster than `soft`: what rolls from a
-   corner on to an edge, round a disk or a rim, touches all the while. */
+/* The instant within (low, high] from which on a touching place closes faster than `soft`, for a particle that rolls from
+   a corner onto an edge round a disk or an arc: it touches all the time. */
 static double rolls_at(int i, int j, double low, double high, double soft) {
     for (int n = 0; n < QUICK; n++) {
         double middle = 0.5 * (low + high);
@@ -539,8 +548,8 @@ static double rolls_at(int i, int j, double low, double high, double soft) {
     return high;
 }
 
-/* When particle i, which has corners, meets j between two times faster than `soft`, `most` being what `fastest_of` says:
-   the instant, or INFINITY. */
+/* The instant between two times at which particle i, which has corners, meets j faster than `soft`, or INFINITY; `most`
+   is the bound of `fastest_of`. */
 double meet_corners(int i, int j, double from, double until, double most, double soft) {
     double span = until - from, small = inner_of(i, j), near = TOUCH * small;
     double h = 0, first = INFINITY, gap[CANDIDATES];
@@ -551,16 +560,17 @@ double meet_corners(int i, int j, double from, double until, double most, double
     double turn = both ? fabs(W.disks[i].spin) + fabs(W.disks[j].spin) : 0;
     double bends = turn * (2 * most + 4 * turn * MAX(W.disks[i].radius, both ? W.disks[j].radius : 0));
     if (are_apart(&a, &b, most * span + near)) return INFINITY;
-    /* On what is round all corners are one candidate: when one leaves, the next may come. */
+    /* On something round all corners are one candidate: when one leaves, the next may arrive. */
     int rolls = b.round >= 0 && span * (fabs(W.disks[i].spin) + (j < 0 ? 0 : fabs(W.disks[j].spin))) > ROLLS;
     for (int c = 0; c < count; c++) {
         Touch now = {.which = c};
-        /* The side that it is on does not change within a step. */
+        /* Its side does not change within a step. */
         if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c, near);
         gap[c] = gap_at(&a, &b, near, &now);
         closed |= gap[c] <= 0;
         if (gap[c] > most * span) continue;
-        /* What is closed to another polygon comes back no faster than is left to the next step; a surface may turn. */
+        /* A closed gap to another polygon closes no faster than is left to the next step; on a surface it may, since
+           surfaces may turn. */
         if (!both || (gap[c] > 0 && least_gap(i, j, &a, &b, from, span, bends, &now) <= 0)) in_reach[many++] = c;
     }
     if (closed && closes_faster(i, j, &a, &b, from, 0, soft)) return from;
@@ -578,7 +588,7 @@ double meet_corners(int i, int j, double from, double until, double most, double
             Touch now = {.which = c};
             if (on_segment && c < a.count) now.on = sides[c];
             double before = gap[c];
-            /* It may have been moved on to another's root. */
+            /* The surface may have been moved to the time of another root. */
             if (j < 0) b2.s = surface_at(-1 - j, t);
             gap[c] = gap_at(&a2, &b2, near, &now);
             if (before <= 0 && gap[c] < before && c - a.count == b.round
@@ -596,9 +606,9 @@ double meet_corners(int i, int j, double from, double until, double most, double
 
 /* ------------------------------------------------------------------------------------------ contacts */
 
-/* Have a contact hold the levers of both about its place, and return what an impulse along and across its normal
-   feels of turning, 1/kg. */
-static void take_levers(Contact *c, const Touch *t, double *feels) {
+/* Set the levers of a contact about both centres, and how an impulse along and across its normal acts through rotation,
+   1/kg. */
+static void take_levers(Contact *c, const Touch *t, double *rotation) {
     const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     const double *pose = pose_of(c->i, a->turned, 0);
     double x = t->x - a->x, y = t->y - a->y, cosine = pose[0], sine = pose[1];
@@ -614,26 +624,26 @@ static void take_levers(Contact *c, const Touch *t, double *feels) {
         c->others[1] = x * c->nx + y * c->ny;
     }
     for (int n = 0; n < 2; n++) {
-        feels[n] = square(c->own[n]) * a->inv_inertia;
-        if (c->two) feels[n] += square(c->others[n]) * b->inv_inertia;
+        rotation[n] = square(c->own[n]) * a->inv_inertia;
+        if (c->two) rotation[n] += square(c->others[n]) * b->inv_inertia;
     }
 }
 
-/* Place and angle of what a contact is between, but for what does not move. */
+/* Positions and angles of both partners of a contact; 0 for a surface. */
 static void pose_now(const Contact *c, double *pose) {
     const Disk *d = W.disks + c->i, *o = W.disks + MAX(c->j, 0);
     memcpy(pose, (double[]){d->x, d->y, d->turned, c->j < 0 ? 0 : o->x, c->j < 0 ? 0 : o->y, c->j < 0 ? 0 : o->turned},
            6 * sizeof(double));
 }
 
-/* Note when a place was looked up, as one of so many. */
+/* Note the pose at which a place was looked up, and the number of places then. */
 static void note_look(Contact *c, int places) {
     c->looked[0] = c->gap;
     c->places = places;
     pose_now(c, c->looked + 1);
 }
 
-/* Acceleration along the normal by which a contact opens if nothing holds it, m/s2. */
+/* Acceleration along the normal at which a contact would open without forces, m/s2. */
 double opens_by(const Contact *c) {
     const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double up = square(a->spin) * c->own[1], pull;
@@ -645,21 +655,21 @@ double opens_by(const Contact *c) {
     return up - pulled(surface_at(-1 - c->j, a->t), &place, c->nx, c->ny, &pull);
 }
 
-/* Fill in a contact at a place of particle i, which has corners, as both partners are now. */
+/* Fill in a contact at a place of particle i, which has corners, from the present states of both. */
 RARELY void describe_touch(Contact *c, int i, int j, const Touch *t) {
     const Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
     const Pair *pair = j < 0 ? surface_pair(a, -1 - j) : pair_of(a->kind, b->kind);
-    double feels[2], mass = a->inv_mass, turn = a->inv_inertia;
+    double rotation[2], mass = a->inv_mass, turn = a->inv_inertia;
     *c = (Contact){.nx = t->nx, .ny = t->ny, .gap = t->gap, .most = INFINITY, .share = 1, .i = i, .j = j, .cornered = 1,
                    .owner = W.owner_count, .rest = pair->restitution, .falls = pair->falls, .friction = pair->friction};
     c->two = j >= 0 && b->mode == FREE;
-    take_levers(c, t, feels);
+    take_levers(c, t, rotation);
     note_look(c, t->many);
     if (c->two) {
         mass += b->inv_mass;
         turn += b->inv_inertia;
     }
-    for (int n = 0; n < 2; n++) c->mass[n] = 1 / (mass + feels[n]);
+    for (int n = 0; n < 2; n++) c->mass[n] = 1 / (mass + rotation[n]);
     c->mass[2] = turn > 0 ? 1 / turn : 0;
     c->pull = -square(a->spin) * c->own[0];
     if (j >= 0) {
@@ -691,7 +701,7 @@ RARELY void describe_touch(Contact *c, int i, int j, const Touch *t) {
     if (is_hung(-1 - j)) hang_on(c, W.movers + s->mover, &place);
 }
 
-/* The contact of the step before at about the same place of both. */
+/* The contact of the step before that was at about the same place of particle i. */
 RARELY const Contact *place_before(const Contact *c) {
     const Contact *found = 0;
     double least = INFINITY;
@@ -706,9 +716,9 @@ RARELY const Contact *place_before(const Contact *c) {
     return least <= 0.5 * W.disks[c->i].inner ? found : 0;
 }
 
-/* By how much the gap of a contact has changed by what both have moved since their place was looked up, m; or NaN if
-   that is more than STILL of a radius. */
-static double went_since(const Contact *c) {
+/* Change of the gap of a contact by the motion of both since the place was looked up, m; NaN if they moved by more than
+   STILL of a radius. */
+static double gap_change_since(const Contact *c) {
     double pose[6], size = W.disks[c->i].radius, turns;
     pose_now(c, pose);
     for (int n = 0; n < 6; n++) pose[n] -= c->looked[n + 1];
@@ -718,8 +728,8 @@ static double went_since(const Contact *c) {
     return (pose[0] - pose[3]) * c->nx + (pose[1] - pose[4]) * c->ny + c->own[0] * pose[2] + c->others[0] * pose[5];
 }
 
-/* Of two in a crowd that have hardly moved since their places were looked up list the contacts of the step before;
-   0 if they are to be looked up. */
+/* If two of a crowd have hardly moved since their places were looked up, list their contacts of the step before; return 0
+   if the places have to be looked up. */
 RARELY int list_still(int i, int j, double h, const Contact **list) {
     const Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
     const Surface *s = W.surfaces + (j < 0 ? -1 - j : 0);
@@ -731,15 +741,15 @@ RARELY int list_still(int i, int j, double h, const Contact **list) {
         if (W.earlier[k].j == j) list[count++] = W.earlier + k;
     if (!count || list[0]->places != count) return 0;
     for (int n = 0; n < count; n++)
-        if (isnan(went_since(list[n]))) return 0;
+        if (isnan(gap_change_since(list[n]))) return 0;
     return count;
 }
 
-/* Fill in a contact as it was in the step before, with the gap that it has now. */
+/* Fill in a contact from that of the step before, with its present gap. */
 RARELY void go_on_with(Contact *c, const Contact *last, double h) {
     double u[3];
     *c = *last;
-    c->gap = c->looked[0] + went_since(c);
+    c->gap = c->looked[0] + gap_change_since(c);
     c->most = INFINITY;
     c->share = 1;
     c->gives = c->parts = c->clings = 0;
@@ -753,9 +763,9 @@ RARELY void go_on_with(Contact *c, const Contact *last, double h) {
     c->free_gap = c->gap + (u[0] + (c->j < 0 ? 0.5 * h * (W.gx * c->nx + W.gy * c->ny) : 0)) * h;
 }
 
-/* ------------------------------------------------------------------------------------------- the blow */
+/* ------------------------------------------------------------------------------------------ impacts */
 
-/* The places at which two touch now, as contacts: those of which a gap is closed, and those that last. */
+/* List the places at which two touch now as contacts: where a gap is closed, or where a contact lasts. */
 RARELY int list_struck(int i, int j, double t, Contact *list) {
     Touch places[MOST_TOUCHES];
     double least = inner_of(i, j);
@@ -765,7 +775,7 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
         lasts |= c->i == i && c->j == j && c->impulse[0] > 0;
     }
     double within = (lasts ? TOUCH : TOUCHING) * least, span = 2 * SOON * W.step, most = 0;
-    /* What has joints is struck as a step begins, if that is so soon. */
+    /* A particle with joints is struck at the beginning of a step, if its impact would be just after it. */
     if (is_tied(i) || is_tied(j)) most = fastest_of(i, j, t, span);
     if (most < INFINITY) within = MAX(within, most * span);
     int found = list_touches(i, j, t, within, t, places);
@@ -777,11 +787,11 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
     return count;
 }
 
-/* Bring what lasts from its hop to its smooth path before a blow: else the hop's velocity, of first order in the step,
-   would enter that. Of the impulses of the step what is not due yet is taken back, or what is due is given: once a
-   step, since that is over soon. Not in a crowd, which is not solved anew at each blow, nor with contacts on what
-   moves, which presses as hard as it must, or that took a blow as the step began, nor with what has joints, whose pull
-   is the same all through the step. */
+/* Before an impact, bring the contacts of an island from their hops to the smooth path: else the velocity of the hop,
+   which is of first order in the step, would enter the impact. Impulses of the step that are not due yet are taken back,
+   those that are due are given. This is done once a step, as the step ends soon after. Not in a crowd, which is not
+   solved again at each impact; not for contacts with a moving surface, which has to press as hard as it moves, or that
+   had an impact at the beginning of the step; and not with joints, whose pull is constant over the step. */
 static void end_hops(int i, double t) {
     const Contact *first = 0, *end = W.contacts + W.contact_count;
     int count = 0, many = 0, stamp = W.step_count + 1;
@@ -823,7 +833,7 @@ static void end_hops(int i, double t) {
         keep_impulse(&last, 1, t, t);
         W.earlier[many++] = last;
     }
-    /* As in a step, only the sum of what is lost is known. */
+    /* As in a step, only the sum of the losses has a meaning. */
     pool(W.earlier, many, 0);
     for (const Contact *c = W.earlier; c < W.earlier + many; c++)
         book(W.disks[c->i].entries, c->two ? W.disks[c->j].entries : 0, c->owner, c->entries);
@@ -831,7 +841,7 @@ static void end_hops(int i, double t) {
     W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
 }
 
-/* Whether a particle that is released touches a surface, and hardly moves off or on. */
+/* Whether a released particle touches a surface with hardly any normal velocity. */
 RARELY int lies_flat(int i, int k) {
     const Disk *d = W.disks + i;
     Touch places[MOST_TOUCHES];
@@ -846,7 +856,7 @@ RARELY int lies_flat(int i, int k) {
     return lies;
 }
 
-/* Whether what is struck has joints, which answer each impulse of the blow. */
+/* Whether a struck particle has joints, which respond to each impulse of the impact. */
 static int answers;
 
 static void give_all(const Contact *c, const double *impulse) {
@@ -854,10 +864,11 @@ static void give_all(const Contact *c, const double *impulse) {
     if (answers) answer_with_joints();
 }
 
-/* What impulses at the places of a blow change of the velocities at all: normal, slip and turn of each, 1/kg. */
-static double feels[3 * MOST_TOUCHES][3 * MOST_TOUCHES];
+/* The matrix of an impact: how impulses and moments at its places change normal velocity, slip and spin at all places,
+   1/kg. */
+static double matrix[3 * MOST_TOUCHES][3 * MOST_TOUCHES];
 
-/* Scalar products of directions of two places, normal and along: 0 for the turn, which has none. */
+/* Scalar product of two directions, normal (0) or tangent (1), at two places; 0 for a moment (2), which has none. */
 static double along_both(const Contact *c, int n, const Contact *o, int k) {
     if (n == 2 || k == 2) return 0;
     if (n == k) return c->nx * o->nx + c->ny * o->ny;
@@ -865,9 +876,9 @@ static double along_both(const Contact *c, int n, const Contact *o, int k) {
     return n ? -cross : cross;
 }
 
-/* Work out what the places of a blow feel. Where joints answer, by impulses that change velocities by as much as `size`,
-   m/s, and are taken back; they may hold a place as it is. */
-static void feel(Contact *list, int count, double size) {
+/* Set the matrix of an impact. If joints respond, it is measured by impulses that change velocities by about `size`, m/s,
+   and are taken back; joints may hold a place entirely. */
+static void find_matrix(Contact *list, int count, double size) {
     for (int m = 0; m < 3 * count; m++) {
         const Contact *c = list + m / 3;
         const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
@@ -882,7 +893,7 @@ static void feel(Contact *list, int count, double size) {
             const Contact *o = list + n;
             if (answers) relative(o, 0, v);
             for (int k = 0; k < 3; k++) {
-                double *to = &feels[3 * n + k][m];
+                double *to = &matrix[3 * n + k][m];
                 if (answers) {
                     double gives = (v[k] - u[n][k]) / one[m % 3];
                     *to = 3 * n + k == m && !(gives > HELD / a->mass) ? 0 : gives;
@@ -899,15 +910,16 @@ static void feel(Contact *list, int count, double size) {
     if (answers) forget_answers();
 }
 
-/* What an impulse along a place, or its moment, may be for one of its normal impulse. */
+/* Bound on a tangential impulse or a moment per normal impulse. */
 static double bound_of(const Contact *c, int n, double share) {
     if (n == 1) return share * MIN(c->friction, share < 1 ? ROUGH : INFINITY);
     return answers ? 0 : share * c->arm;
 }
 
-/* Find all impulses at once, if those stay free that sweeps have left so, and the others at their bounds: sweeps that
-   follow tell whether they do. What joints answer is known too roughly for it. */
-static void solve_blow(Contact *list, int count, const double *back, double share, double *v) {
+/* Solve for all impulses at once, under the assumption that those that are free after the sweeps stay free and the others
+   stay at their bounds; the sweeps that follow check that. Not with joints, as their response is not known exactly
+   enough. */
+static void solve_directly(Contact *list, int count, const double *back, double share, double *v) {
     double rows[3 * MOST_TOUCHES][3 * MOST_TOUCHES + 1], bound[3 * MOST_TOUCHES];
     int free[3 * MOST_TOUCHES], many = 0;
     for (int m = 0; m < 3 * count; m++) {
@@ -924,33 +936,33 @@ static void solve_blow(Contact *list, int count, const double *back, double shar
         rows[n][many] = (m % 3 ? 0 : back[m / 3]) - v[m];
         for (int k = 0; k < many; k++) {
             int o = free[k];
-            rows[n][k] = feels[m][o];
+            rows[n][k] = matrix[m][o];
             for (int with = o + 1; o % 3 == 0 && with < o + 3; with++)
-                if (bound[with] != 0) rows[n][k] += feels[m][with] * bound[with];
+                if (bound[with] != 0) rows[n][k] += matrix[m][with] * bound[with];
         }
     }
     for (int n = 0; n < many; n++)
         for (int k = 0; k < many; k++) {
-            if (k == n || !(fabs(rows[n][n]) > SAME * feels[free[n]][free[n]])) continue;
+            if (k == n || !(fabs(rows[n][n]) > SAME * matrix[free[n]][free[n]])) continue;
             double by = rows[k][n] / rows[n][n];
             for (int o = n; o <= many && by != 0; o++) rows[k][o] -= by * rows[n][o];
         }
     for (int n = 0; n < many; n++) {
         int m = free[n];
         double *J = list[m / 3].impulse;
-        if (!(fabs(rows[n][n]) > SAME * feels[m][m])) continue;
+        if (!(fabs(rows[n][n]) > SAME * matrix[m][m])) continue;
         double more = rows[n][many] / rows[n][n];
         for (int o = m; o < (m % 3 ? m + 1 : m + 3); o++) {
             double change = o == m ? more : bound[o] * more;
             J[o % 3] += change;
-            for (int k = 0; k < 3 * count && change != 0; k++) v[k] += feels[k][o] * change;
+            for (int k = 0; k < 3 * count && change != 0; k++) v[k] += matrix[k][o] * change;
         }
     }
 }
 
-/* Impulses at all places such that gaps do not close, or open as fast as they are to, and that friction, a share of
-   it, stops slip as far as it may, and a disk's rolling friction its rolling, unless there are joints. */
-static void share_blow(Contact *list, int count, const double *back, double share) {
+/* Find impulses at all places such that no gap closes, or that it opens as fast as restitution asks for; friction, scaled
+   by `share`, stops slip within its bound, and rolling friction the rolling of a disk, unless there are joints. */
+static void solve_impact(Contact *list, int count, const double *back, double share) {
     double size = 0, v[3 * MOST_TOUCHES];
     for (int n = 0; n < count; n++) {
         size = MAX(size, back[n]);
@@ -959,13 +971,13 @@ static void share_blow(Contact *list, int count, const double *back, double shar
     for (int sweep = 0, direct = DIRECT; sweep < SWEEPS; sweep++) {
         double worst = 0;
         if (sweep == direct && !answers) {
-            solve_blow(list, count, back, share, v);
+            solve_directly(list, count, back, share, v);
             direct *= DIRECT;
         }
         for (int m = 0; m < 3 * count; m++) {
             const Contact *c = list + m / 3;
             if (m % 3 == 2 && c->arm == 0) continue;
-            double *J = list[m / 3].impulse, gives = feels[m][m], most = INFINITY, least = 0;
+            double *J = list[m / 3].impulse, gives = matrix[m][m], most = INFINITY, least = 0;
             if (m % 3) {
                 most = bound_of(c, m % 3, share) * J[0];
                 least = -most;
@@ -975,7 +987,7 @@ static void share_blow(Contact *list, int count, const double *back, double shar
             if (change == 0) continue;
             J[m % 3] += change;
             if (m % 3 < 2) size = MAX(size, fabs(J[m % 3]) * gives);
-            for (int k = 0; k < 3 * count; k++) v[k] += feels[k][m] * change;
+            for (int k = 0; k < 3 * count; k++) v[k] += matrix[k][m] * change;
             worst = MAX(worst, fabs(change) * gives * (m % 3 < 2 ? 1 : W.disks[MAX(c->j, 0)].radius));
         }
         if (worst <= ENDS * size) break;
@@ -983,13 +995,13 @@ static void share_blow(Contact *list, int count, const double *back, double shar
     for (int n = 0; n < count; n++) give_all(list + n, list[n].impulse);
 }
 
-/* Find the impulses of a blow. Newton's restitution with friction, or at several places, may seem to give energy where
-   one turns what the other does (T. R. Kane, J. Appl. Mech. 51, 1984): then friction is less, and at last there is
-   no restitution, which never gives any. `u` are the velocities before. Return what is lost, J. */
-static double share_out_blow(Contact *list, int count, double *back, const double (*u)[3]) {
+/* Find the impulses of an impact. Newton's restitution with friction, or at several places, may seem to create energy if
+   one impulse changes the velocity at another place (T. R. Kane, J. Appl. Mech. 51, 1984). Then friction is reduced, and
+   finally restitution is 0, which never creates energy. `u` are the velocities before. Return the loss, J. */
+static double solve_with_energy(Contact *list, int count, double *back, const double (*u)[3]) {
     for (double share = 1;;) {
         double lost = 0, size = 0, v[3];
-        share_blow(list, count, back, share);
+        solve_impact(list, count, back, share);
         for (int n = 0; n < count; n++) {
             const double *J = list[n].impulse;
             relative(list + n, 0, v);
@@ -1010,7 +1022,7 @@ static double share_out_blow(Contact *list, int count, double *back, const doubl
     }
 }
 
-/* Resolve the blow of particle i, which has corners, and j at all places at which they touch. */
+/* Resolve the impact of particle i, which has corners, with j, at all places at which they touch. */
 RARELY void strike_corners(int i, int j, double t) {
     Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
     Contact list[MOST_TOUCHES], *main = list;
@@ -1034,7 +1046,7 @@ RARELY void strike_corners(int i, int j, double t) {
         if (approach > 0 && (calm || ends)) back[n] = 0;
         rests |= approach > 0 && back[n] == 0;
     }
-    /* What was foreseen, but is not so, counts: it is left to the next step at last. */
+    /* An impact that was foreseen, but does not happen, is counted, so that it is left to the next step in the end. */
     was_moved(i);
     if (!(fastest > 0)) return;
     if (two) was_moved(j);
@@ -1043,8 +1055,8 @@ RARELY void strike_corners(int i, int j, double t) {
     for (int again = 1; again;) {
         double wanted[MOST_TOUCHES];
         memcpy(wanted, back, sizeof back);
-        feel(list, count, fastest);
-        lost = share_out_blow(list, count, wanted, u);
+        find_matrix(list, count, fastest);
+        lost = solve_with_energy(list, count, wanted, u);
         int lets_go = answers && let_go_again();
         again = lets_go || hold_hinge(list, count, u, back);
         for (int n = 0; n < count && again; n++) {
@@ -1063,7 +1075,7 @@ RARELY void strike_corners(int i, int j, double t) {
         slip += MAX(c->entries[2], 0);
         if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
     }
-    /* Only the sum is known where one turns what the other does. */
+    /* Only the sum has a meaning where one impulse changes the velocity at another place. */
     double by = normal + slip > 0 ? MAX(lost, 0) / (normal + slip) : 0;
     for (int n = 0; n < count; n++) {
         Contact *c = list + n;
@@ -1098,6 +1110,6 @@ RARELY void strike_corners(int i, int j, double t) {
         a->on = main->owner;
         a->slips = 1;
     }
-    /* What comes to rest is held from the next step on, which begins soon; in a crowd it may hop until then. */
+    /* A place that comes to rest is a contact from the next step on, which begins soon; in a crowd it may hop until then. */
     if (rests && W.contact_count <= FEW_CONTACTS) W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
 }

@@ -1,4 +1,4 @@
-/* What the files of the core share: the world, small helpers, and one line a function. */
+/* What the files of the core share: the world, small helpers, and declarations of functions. */
 
 #ifndef CORE_H
 #define CORE_H
@@ -10,95 +10,97 @@
 
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
-#define ALARM (-1000000) /* partner of a release or of a ride's end; no surface has that number */
+#define ALARM (-1000000) /* partner of a release or of a ride's end; not the number of any surface */
 
-/* Of what hardly any scene asks for: inline it would slow all that asks. */
+/* For functions that hardly any scene calls: inlined they would slow down the others. */
 #define RARELY __attribute__((noinline))
 
 extern World W;
 
-/* What was too small, so that `run` makes more room. */
+/* The array that was too small, so that `run` makes more room. */
 enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS, FULL_SWINGS };
 
-/* Contacts are looked for where a gap is below this share of the radius: what lasts stays a
-   thousandth of it apart at most, and nothing crosses the rest within a step unseen. */
+/* Contacts are searched up to a gap of this share of the radius. Lasting contacts have gaps up to a fifth of it at most,
+   and nothing crosses the rest within a step without being foreseen. */
 #define TOUCH 5e-3
-/* Overlap, in radii, from which on nothing may sink further, not even by a hop. */
+/* Overlap, in radii, from which on nothing may approach further, not even by a hop. */
 #define SUNK 1e-2
-/* Share of what is left to the next step otherwise (see SKIP) that is left of an approach there: else it
-   would sink by so much in each step wherever a pile is wedged, and cannot part. */
+/* Share of the usual approach (see SKIP) that is left to the next step in such a contact: else a wedged pile, which
+   cannot open, would sink by it in each step. */
 #define HARDLY 0.1
-/* Overlap, in radii, of disks that just touch, written with some digits: their places count as free. */
+/* Overlap, in radii, of disks that just touch, as places are written with some digits: such places count as free. */
 #define TOUCHING 1e-9
-/* Approach, in radii per step, that is left to the next step instead of an impact at its instant:
-   a tenth of TOUCH, so that what is left is in reach of the contacts before it overlaps. */
+/* Approach, in radii per step, that is left to the next step instead of an impact at its instant: a tenth of TOUCH, so
+   that it becomes a contact before it is an overlap. */
 #define SKIP 5e-4
-/* The same once a disk had MANY impacts in a step; it grows by GROW with each, up to MOST_SKIP. */
+/* The same for a disk with more than MANY impacts in a step: with each it grows by the factor GROW, up to MOST_SKIP. */
 #define MOST_SKIP 5e-3
 #define MANY 20
 #define GROW 1.2
-/* Impacts of a disk in a step from which on a slow one (below SLOW times what gravity does in a
-   step) has no restitution: the infinitely many of an inelastic collapse end. */
+/* Number of a disk's impacts in a step from which on a slow one (below SLOW times what gravity gives in a step) has no
+   restitution: this ends an inelastic collapse, which has infinitely many. */
 #define FEW 10
 #define SLOW 20.0
-/* ... from which on what rattles between surfaces is jammed: it is solved with all it touches ... */
+/* ... from which on a disk that rattles between surfaces is jammed: it is solved together with all that it touches ... */
 #define JAM 40
-/* ... and from which on the step ends, so that the whole crowd round it is solved at once; or, where
-   that has just been done, less than SHORTEST of a step ago, the jam. */
+/* ... and from which on the step ends, so that the whole crowd round it is solved together; or, if that was less than
+   SHORTEST of a step ago, the jam. */
 #define CROWDED 50
 #define SHORTEST 0.02
-/* ... and from which on more is left to the next step, without a bound, since jams do not calm it. */
+/* ... and from which on more is left to the next step, without bound, as jams do not calm it. */
 #define STUCK 500
-/* Disks that a jam is solved for, with all they touch: what goes on beyond are impacts of their own,
-   and a pile of thousands is not solved at each of them. */
+/* Number of disks that a jam solves, with all that they touch. Beyond them impacts go on singly, so that a pile of
+   thousands is not solved at each jam. */
 #define JAMMED 30
-/* Contacts per disk that a jam may have: disks in a plane have three pairs each at most. */
+/* Contacts per disk for which a jam has room; disks in a plane have three pairs each at most. */
 #define TOUCHES 8
-/* Sweeps that a jam may take: what they leave open rattles on, and is the next jam after a few impacts. */
+/* Greatest number of sweeps of a jam: what they leave open rattles on, and causes the next jam after a few impacts. */
 #define JAM_SWEEPS 2000
-/* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
+/* Share of sqrt(g r); at a lower speed an island may fall asleep. 0.5 mm/s for r = 4 mm. */
 #define REST 2.5e-3
-/* m/s2; gravity for which bounds on speeds and times are written: others have `W.pace` of them. */
+/* m/s2; gravity for which bounds on speeds and times are written; for another one they are scaled by `W.pace`. */
 #define EARTH 9.81
-/* s on Earth; so long an island has to be at rest. */
+/* s on Earth; an island has to be at rest for so long before it sleeps. */
 #define CALM_DOWN 0.05
-/* Of the speed; a slower approach grazes, and rounding may well have made it. */
+/* Share of the speed; a slower approach is a grazing one, and may be rounding. */
 #define GRAZE 1e-6
-/* Friction, 76 degrees, that takes all slip in any blow; where sweeps diverge it is lowered from here. */
+/* Coefficient of friction, 76 degrees, that stops all slip in any impact; where sweeps diverge it is reduced from here
+   on. */
 #define ROUGH 4.0
-/* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
+/* Number of a disk's impacts in a step that no collapse reaches: something is wrong, and the run stops. */
 #define STALL 20000
-/* Of the radius: hops of what lies stay below it, else the step is shorter than asked for. */
+/* Share of the radius; hops of contacts stay below it, if need be by a shorter step. */
 #define HOP 1e-3
-/* rad; steps of a disk by itself turn it by no more inside an arc. */
+/* Greatest path of a disk by itself in a step inside an arc, as a share of the room there: by this angle, rad, the path
+   turns. */
 #define TURN 0.2
-/* Of a step: what befalls joints nearer to its beginning or end counts as there, else rounding would be taken
-   back in next to no time. */
+/* Share of a step: events of joints that are nearer to its beginning or end count as there, else rounding would be
+   corrected in a step of almost no length. */
 #define SOON 1e-6
-/* Contacts of what has corners up to which they are solved to rounding, and blows on them are no hops: more are
-   a crowd. */
+/* Greatest number of contacts, with corners, that are solved to rounding, and where impacts end hops; more are a crowd. */
 #define FEW_CONTACTS 32
-/* Times `W.soft`: approach up to which two of a crowd with corners that rest on something are left to the next step. */
+/* Times `W.soft`: approach up to which two particles of a crowd with corners, of which one is supported, are left to the
+   next step. */
 #define LATEST 4
-/* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
+/* Number of impacts per lasting contact that an impact may pass on at its instant; others are foreseen. */
 #define SHOCKS 4
 
 static inline double square(double a) { return a * a; }
 
-/* A place at which a particle with corners is near something: the normal towards it, how near, where; and which corner
-   of both that is, on what, see corners.c; of how many. */
+/* A place where a particle with corners is near something: the unit normal towards the particle, the gap now and later,
+   the position; which corner of both it is, and what that is on, see corners.c; and the number of such places of the two. */
 typedef struct { double nx, ny, gap, later, x, y; int which, on, many; } Touch;
-/* Such places of two, at most. */
+/* Greatest number of such places of two. */
 #define MOST_TOUCHES 8
 
-/* Two doubles at once: each rounds as by itself. */
+/* Two doubles at once; each is rounded as if alone. */
 typedef v128_t Two;
 
 static inline Two two(const double *from) { return wasm_v128_load(from); }
 static inline Two times(double a, Two v) { return wasm_f64x2_mul(wasm_f64x2_splat(a), v); }
 static inline Two plus(Two a, Two b) { return wasm_f64x2_add(a, b); }
 static inline Two minus(Two a, Two b) { return wasm_f64x2_sub(a, b); }
-/* Whether both are at most so far from 0; what is no number is not. */
+/* Whether both numbers are within -most and most; NaN is not. */
 static inline int are_within(Two v, double most) {
     return wasm_i64x2_all_true(wasm_f64x2_le(wasm_f64x2_abs(v), wasm_f64x2_splat(most)));
 }
@@ -114,8 +116,8 @@ static inline double cohesion_of(int i, int j) {
     const Disk *d = W.disks + i;
     return (j < 0 ? surface_pair(d, -1 - j) : pair_of(d->kind, W.disks[j].kind))->cohesion;
 }
-/* Whether a disk is spared: a gate shut on it, or what is solid from one side lets it through, and it is not clear
-   of that yet; or CLEARS: it will be in this step. */
+/* Whether a surface ignores a disk: a gate has closed on it, or a one-sided surface lets it pass, and it is not clear of
+   it yet. CLEARS: it will be in this step. */
 #define CLEARS 2
 static inline int *spared_by(const Surface *s, const Disk *d) {
     return W.spared + (d - W.disks) * W.gate_count + s->gate;
@@ -128,16 +130,17 @@ static inline int has_corners(const Disk *d) { return W.outline_count && d->corn
 static inline int is_cornered(int i, int j) {
     return W.outline_count && (W.disks[i].corners || (j >= 0 && W.disks[j].corners));
 }
-/* Whether a surface is there and near the box that a disk can reach in this step ... */
+/* Whether a surface exists and overlaps the box that a disk can reach in this step ... */
 static inline int is_beside(const Surface *s, const Disk *d) {
     return s->there && s->box[0] < d->right && s->box[2] > d->left && s->box[1] < d->top
         && s->box[3] > d->bottom;
 }
-/* ... and does not spare it. */
+/* ... and does not ignore it. */
 static inline int is_near(const Surface *s, const Disk *d) { return is_beside(s, d) && !is_spared(s, d); }
-/* The piece that goes on smoothly beyond an end of a surface, of a circle one that leads to it, or -1. */
+/* The piece that continues smoothly beyond an end of a surface, for a circle one that leads to it; or -1. */
 static inline int mate_of(const Surface *s, int n) { return s->ledges[n] <= W.ledge ? s->mates[n] : -1; }
-/* Whether two partners of a disk, in the numbers of `Contact.j`, are one or go on smoothly. */
+/* Whether two surfaces, in the numbers of `Contact.j`, continue each other; whether two partners of a disk are the same
+   or do so. */
 static inline int is_mate(int j, int other) {
     const Surface *s = W.surfaces + (-1 - j);
     return mate_of(s, 0) == -1 - other || mate_of(s, 1) == -1 - other;
@@ -145,32 +148,32 @@ static inline int is_mate(int j, int other) {
 static inline int goes_on(int j, int other) {
     return j == other || (j < 0 && other < 0 && (is_mate(j, other) || is_mate(other, j)));
 }
-/* The same for surfaces of which a disk touches the same place: pieces in one place, or the point that
-   two share. */
+/* The same for surfaces that a disk touches at the same place: pieces that lie on each other, or a point that two share. */
 int is_one(const Disk *d, int k, int other);
 int is_held(const Disk *d, int k);
-/* Whether a disk that is on a piece at the beginning of a step is on no hollow at its end. */
+/* Whether a disk that is on a piece at the beginning of a step cannot be inside an arc at its end. */
 static inline int is_flat(const Surface *s) {
     return s->shape == SEGMENT && mate_of(s, 0) < 0 && mate_of(s, 1) < 0;
 }
-/* Longest step in which what is pressed on something, by so much (m/s2), hops by no more than HOP radii, s. */
+/* Longest step in which a disk that is pressed on something with this acceleration (m/s2) hops no higher than HOP radii,
+   s. */
 static inline double hop_time(const Disk *d, double press) {
     return press > 0 ? sqrt(8 * HOP * (has_corners(d) ? d->inner : d->radius) / press) : INFINITY;
 }
-/* A surface where it is at t. */
+/* A surface at its position at t. */
 const Surface *move_to(Surface *s, double t);
 static inline const Surface *surface_at(int k, double t) {
     Surface *s = W.surfaces + k;
     return s->mover < 0 || s->posed == t ? s : move_to(s, t);
 }
-/* Whether a surface hangs on a hinge. */
+/* Whether a surface is on a hinge. */
 static inline int is_hung(int k) { return W.surfaces[k].mover >= 0 && W.movers[W.surfaces[k].mover].inertia > 0; }
 /* Whether a surface moves in this step. */
 static inline int stirs(const Surface *s) { return s->mover >= 0 && W.movers[s->mover].stirs; }
-/* Normal impulse of a contact, with what cohesion pulls, N s. */
+/* Normal impulse of a contact less that of cohesion, N s. */
 static inline double pressed(const Contact *c) { return c->impulse[0] - c->clings; }
 double swung(const Contact *c, double f);
-/* Work that the motion of a surface does by a contact's impulses, of which the share f has been given, J. */
+/* Work that the motion of a surface does by a contact's impulses after the share f of them, J. */
 static inline double driven(const Contact *c, double f) {
     double still = (1 - f) * (pressed(c) * c->moved[0] + c->impulse[1] * c->moved[1] + c->impulse[2] * c->moved[2]);
     return c->hung ? still + swung(c, f) : still;
@@ -178,9 +181,9 @@ static inline double driven(const Contact *c, double f) {
 /* Whether a particle has joints. */
 static inline int is_tied(int i) { return i >= 0 && W.disks[i].tie >= 0; }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
-/* Of a loop over all that are live as a step begins, or were released in it. */
+/* Head of a loop over all disks that are live as a step begins or were released in it. */
 #define EACH_LIVE(i) int at_##i = 0, i; at_##i < W.live_count && (i = W.live[at_##i], 1); at_##i++
-/* Kinetic and potential energy of a disk with a velocity, a spin and a place, J. */
+/* Kinetic and potential energy of a disk for a velocity, a spin and a position, J. */
 static inline double kinetic_of(const Disk *d, const double *v, double spin) {
     return 0.5 * (d->mass * (square(v[0]) + square(v[1])) + d->inertia * square(spin));
 }
@@ -188,12 +191,12 @@ static inline double lifted(const Disk *d, const double *place) {
     return d->mass * W.g * (W.up[0] * place[0] + W.up[1] * place[1]);
 }
 
-/* Change of normal velocity that a contact asks for under a normal impulse, m/s. */
+/* Change of normal velocity that a contact asks for at a normal impulse, m/s. */
 static inline double asks(const Contact *c, double impulse) {
     return MAX(MIN(c->need - c->gives * impulse, c->most), c->need - c->parts);
 }
 
-/* Move a disk along its parabola. */
+/* Move a disk along its parabola up to t. */
 static inline void advance(Disk *d, double t) {
     double h = t - d->t;
     d->x += (d->vx + 0.5 * W.gx * h) * h;
@@ -204,8 +207,8 @@ static inline void advance(Disk *d, double t) {
     d->t = t;
 }
 
-/* Whether a disk by itself flies off a surface that is so rough that a touch, however soft, is a blow:
-   it is not pressed again before it comes back. */
+/* Whether a disk by itself moves off a surface that is so rough that even a soft contact is an impact: it is not pressed
+   again before it comes back. */
 static inline int flies_off(const Disk *d, int k, double rate) {
     return surface_pair(d, k)->friction > ROUGH
         && rate > GRAZE * (sqrt(d->vx * d->vx + d->vy * d->vy) + W.soft);

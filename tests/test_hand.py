@@ -1,7 +1,7 @@
 """Runs by hand: steps, pushes, plates that are turned, belts and motors whose speeds are set."""
 
 import re
-from math import cos, inf, nan, radians, sin
+from math import asin, atan2, cos, hypot, inf, nan, radians, sin
 from pathlib import Path
 
 import numpy as np
@@ -193,6 +193,27 @@ def test_a_plate_that_is_turned_strikes_as_a_paddle_does():
     ledger = closes(run.recording)
     assert ledger.drive_work == pytest.approx(impulse * rate * foot, rel=1e-9)
     assert ledger.by_surface["paddle"]["drive_work"] == pytest.approx(ledger.drive_work)
+
+
+@pytest.mark.parametrize("pegs", [0, 20])
+def test_a_plate_that_is_turned_meets_what_sleeps_where_it_comes_by(pegs):
+    """It is R away from a disk at d from its pivot at an angle of atan(x/y) - asin(R/|d|)."""
+    x, y, angle, span = 0.3, 0.22, radians(80.0), 0.3
+    plate = {"name": "paddle", "pivot": [0.0, 0.0], "angle_deg": 0.0, "above": 0.5, "below": 0.0}
+    shelf = {**FLOOR, "from": [0.2, y - R], "to": [2.0, y - R]}
+    # With many surfaces a disk checks those near it only, and none of these ever is.
+    far = {"name": "pegs", "from": [5.0, 0.0], "to": [5.1, 0.0]}
+    far["repeat"] = [[max(pegs, 1), 1.0, 0.0]]
+    plate |= {"restitution": 0.0, "friction": 0.0}
+    run = chutelab.start(scene((x, y), [shelf, far], plate=plate))
+    run.step(0.1)
+    begin, met = run.t, atan2(x, y) - asin(R / hypot(x, y))
+    run.set("plate.angle_deg", -80.0)
+    run.step(span)
+    blows = run.recording.select("impact", surface="paddle")
+    assert blows["t"][0] == pytest.approx(begin + met / angle * span, abs=1e-6)
+    assert run.positions[0, 0] > x + 0.1
+    closes(run.recording)
 
 
 def test_belts_and_motors_are_set():

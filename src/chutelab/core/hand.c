@@ -62,6 +62,9 @@ EXPORT int steer(int owner, double x, double y, double angle, double until) {
     m->until = until;
     m->rate = (angle - now) / (until - W.t);
     m->t = NAN;
+    /* Sleepers are not passed over by a long step, and those beside what it may sweep now list it. */
+    W.stirs = 1;
+    for (int i = 0; i < W.disk_count && is_new; i++) W.disks[i].zone[0] = INFINITY;
     if (is_new) join_surfaces();
     for (Surface *s = W.surfaces; s < W.surfaces + W.surface_count; s++) {
         if (s->owner != owner) continue;

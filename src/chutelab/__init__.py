@@ -16,8 +16,8 @@ The rooms of the house; each imports only those below it:
 - `results`: recordings, ledger, comparison, summary;
 - `theory` and `machine`: the paper in closed form; a scene resolved to arrays for the engines;
 - `scene`: scene files;
-- `core`: what runs in Python and in the page alike, in C: builds machines, runs the exact and
-  the contact engine, judges runs;
+- `core`: C code that Python and the page both run: builds machines, runs the exact and the contact
+  engine, judges runs;
 - `util`: small things for all.
 
 What most people need is here: `scenes`, `load`, `Scene`, `SceneError`, `simulate`, `Recording`,
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
 
     scenes = shipped
     __version__: str
-    """Of the package that is installed."""
+    """Version of the installed package."""
 
 _HOME = {
     "Kind": "results:Kind", "LawWarning": "util.errors:LawWarning",
@@ -71,7 +71,7 @@ _HOME = {
     "simulate": "engines.simulation:simulate", "solve": "studies.design:solve",
     "start": "engines.hand:start", "sweep": "studies.sweep:sweep", "theory": "theory",
 }  # fmt: skip
-"""Where each name is: a module, or what is in one."""
+"""The module of each public name, or the module itself."""
 
 __all__ = [*_HOME, "__version__"]
 

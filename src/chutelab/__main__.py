@@ -1,6 +1,6 @@
 """The command ``chutelab``, which is ``python -m chutelab`` too.
 
-What takes long to import is imported inside `main`, where signals are waited for.
+Slow imports are inside `main`, where signals are already handled.
 """
 
 import atexit
@@ -14,10 +14,10 @@ from chutelab.util.signals import exit_code, raised
 
 def main() -> None:
     """Run the command line; a signal ends it without a traceback, from the first import on."""
-    # Commands open no windows: a backend that does not exist here must not stop them.
+    # Commands open no windows, so a backend that does not exist here must not stop them.
     os.environ["MPLBACKEND"] = "agg"
-    # Most of what a command makes are modules and their classes, which stay: to look for garbage
-    # among them after every 700 objects, and at the end, takes a quarter of a short run.
+    # A command makes mostly modules and classes, which stay. Looking for garbage among them after
+    # every 700 objects, and at the end, takes a quarter of a short run.
     gc.set_threshold(50_000)
     atexit.register(gc.freeze)
     with raised(last=True):
@@ -29,7 +29,7 @@ def main() -> None:
             code = exit_code(error)
             if code is None:
                 raise
-            # At once: what was interrupted midway may bring down the interpreter's own end.
+            # Exit at once: after an interruption midway the interpreter's own shutdown may fail.
             with suppress(OSError, ValueError):
                 sys.stdout.flush()
             atexit._run_exitfuncs()

@@ -45,23 +45,23 @@ ANSWERS: Final = {
 """The answers: how each is found, and what it shares with others."""
 
 BLOWS: Final = {"exact": 1e-12, "dop853": 1e-12, "contact": 1e-10, "pymunk": 1e-9}
-"""Relative error allowed where all contacts are blows, and a change of the inputs is not
+"""Relative error allowed if all contacts are impacts and a change of the inputs is not
 magnified."""
 
 STEADY: Final = 1e6
-"""Magnification of a change of the inputs beyond which no order is looked for: the error of a step,
-some 1e-7, then sends the particle another way through the machine."""
+"""Magnification of a change of the inputs beyond which the order is not checked: then even a step's
+error of 1e-7 leads the particle on another path through the machine."""
 
 ORDERS: Final = {"contact": 2.0, "pymunk": 1.0}
-"""Order at which the error of a stepped engine vanishes, at least."""
+"""Least order of convergence of a stepped engine."""
 
 REFINED: Final = {"contact": ((1.0, 4.0, 16.0),), "pymunk": ((0.5, 1.0), (1.0, 2.0))}
-"""By what the scene's step is divided to show an order; finer where coarse steps show none, as a
-step of Pymunk takes long."""
+"""Divisors of the scene's step with which the order is measured. The second set is used if the
+first shows no order; Pymunk begins with the coarser one, since its steps are slow."""
 
 NEARBY: Final = (1.0, 0.85, 0.7)
-"""Shares of a step; the largest error counts, since one alone may be small by luck, see
-`CHANCE`."""
+"""Each step is also run at these shares of it, and the largest error counts: a single one may be
+small by chance, see `CHANCE`."""
 
 CHANCE: Final = {"contact": 0.5, "pymunk": 0.5}
 """By how much the observed order may fall short of `ORDERS`: an error depends on where within a
@@ -69,21 +69,21 @@ step things happen. Over two ratios of 4, half an order is a factor of 4 between
 one of 2 one of 1.4."""
 
 LIES: Final = 1e-6, 1e-4
-"""Radii: what moves by less all the while lies still, with no order to look for; by how much other
-answers may have it elsewhere then, in the end, in radii, and in its weight times one."""
+"""In radii: a particle that never moves by more counts as at rest, and no order is measured. Other
+answers may then differ by this at the end, in radii and in weight times radius."""
 
 
 @dataclass(frozen=True)
 class Agreement:
     """One quantity in two answers."""
 
-    pair: tuple[str, ...]  # which two; one, of an answer that is left out
+    pair: tuple[str, ...]  # the two answers; only one if the other is left out
     quantity: str  # what is compared; or why nothing is
     # relative difference, or the order at which it vanishes; None if nothing is compared
     difference: float | None = None
-    # what it must not exceed (with `least`: fall short of); None where nothing is promised
+    # upper bound (with `least`: lower bound) of the difference; None if nothing is promised
     tolerance: float | None = None
-    least: bool = False  # whether the tolerance is one from below
+    least: bool = False  # whether the tolerance is a lower bound
 
     @property
     def holds(self) -> bool:
@@ -95,7 +95,7 @@ class Agreement:
 
 
 PATIENCE: Final = 300.0
-"""s of wall time that one answer may take: whatever an engine does, `verify` ends."""
+"""Most wall time of one answer, s, so that `verify` ends whatever an engine does."""
 
 
 def agreement(
@@ -105,8 +105,8 @@ def agreement(
 ) -> tuple[Agreement, ...]:
     """Run particle 0 of a scene, alone, with every engine and SciPy; compare all answers.
 
-    An answer that takes longer than `max_seconds`, wall time, is left out. Those that are `known`,
-    runs of the scene by engine, are taken where the scene has only this particle.
+    An answer that takes longer than `max_seconds`, wall time, is left out. If the scene has only
+    this particle, the runs in `known` (by engine) are used instead of new ones.
 
     Raises a `SceneError` if the geometry contradicts itself.
     """
@@ -126,13 +126,13 @@ def agreement(
     base = next(iter(found))
     if len(found) == 1 and compare(found[base]).max is None:
         return (*rows, Agreement((base, "theory"), compare(found[base]).reason))
-    # Magnification of a small change of the inputs; inf if other contacts follow from it.
+    # Magnification of a small change of the inputs; inf if it leads to other contacts.
     try:
         moved = answer(stirred(alone, STIR), base, max_seconds=max_seconds)
         growth = max(1.0, distance(moved, found[base])[0] / STIR)
     except UNABLE:
         growth = inf
-    # Whether anything but gravity acts between blows, apart from the ride by adhesion.
+    # Whether forces other than gravity act between impacts, apart from the ride by adhesion.
     track = found[base].track(0)
     if found[base].machine.releases.carried[0]:
         # None if it never leaves.
@@ -144,7 +144,7 @@ def agreement(
     lies = way <= LIES[0] * np.min(found[base].particle.radius)
     blows = not (np.abs(velocity[time > 0.0]) > 1e-9 * speed).any()
     for name, recording in found.items():
-        # Pymunk's steps end at blows only of a lone particle among two-sided surfaces that stay.
+        # Pymunk's steps end at impacts only for a lone particle among fixed two-sided surfaces.
         apart = alone.run.align and not (alone.movers or alone.one_sided)
         stepped = name == "pymunk" and not apart
         even = name not in ORDERS or (blows and not stepped)
@@ -172,7 +172,7 @@ def agreement(
 
 
 Off = Callable[[Recording, Recording], tuple[float, str]]
-"""How far two runs are apart, and in what."""
+"""Largest difference between two runs, and the quantity that differs most."""
 
 
 def _with_base(
@@ -181,13 +181,13 @@ def _with_base(
 ) -> Agreement:  # fmt: skip
     """Compare an answer with the base.
 
-    Where both step over blows, it is luck which grazes they tell of: with `wide` it is enough that
-    the end and the ledger come nearer.
+    If both engines step over impacts, it is chance which grazing contacts they report. With `wide`,
+    only the end and the ledger have to come nearer.
     """
     pair = (name, base.engine)
     error, which = distance(recording, base)
     if allowed is None and error <= BLOWS.get(name, 0.0):
-        allowed = BLOWS[name]  # no worse than where there is no step to go wrong by
+        allowed = BLOWS[name]  # the same tolerance as for an engine without steps
     if allowed is not None or name not in ORDERS:
         what = "largest relative difference" if isfinite(error) else f"they differ in {which}"
         return Agreement(pair, what, error if isfinite(error) else None, allowed)
@@ -210,12 +210,13 @@ def _order(
 ) -> tuple[list[float], float] | str:  # fmt: skip
     """Return the errors of an engine at shares of its step and their order; or why there is none.
 
-    `runs`, by step, are taken where they are there, and added to. An error that is not finite ends
+    Known runs in `runs` (by step) are used, and new ones added. An error that is not finite ends
     the search: its order is NaN, and those of longer steps are not looked for.
     """
     ratio, least = refined[1] / refined[0], ORDERS[name] - CHANCE[name]
     errors, found = [0.0 for _ in refined], nan
-    # The longest steps last: as soon as one of their errors shows the order, larger ones show more.
+    # The longest steps come last: once one of their errors shows the order, larger steps need not
+    # be run.
     for level, parts in reversed(list(enumerate(refined))):
         for share in NEARBY:
             step = scene.run.dt / parts * share
@@ -238,7 +239,8 @@ def _order(
 def order(errors: list[float], ratio: float, floor: float) -> float:
     """Return the order at which errors vanish from step to step; inf if all of them are rounding.
 
-    An error may be small by luck, so that counts which is the largest at a step or any finer one.
+    An error may be small by chance, so each step counts with the largest error at it or any finer
+    one.
     """
     worst = np.maximum.accumulate(np.array(errors)[::-1])[::-1]
     if not np.isfinite(worst).all():
@@ -254,14 +256,15 @@ def order(errors: list[float], ratio: float, floor: float) -> float:
 ENGINES = ("exact", "contact", "pymunk")
 
 MOST_ALONE = 10
-"""Particles that do not meet get a pymunk space each; of more, particle 0 alone is compared."""
+"""Each particle that meets no other gets its own Pymunk space; beyond this number only particle 0
+is compared."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One expectation of a scene, looked at in one answer."""
+    """One expectation of a scene, checked in one answer."""
 
-    # what was looked at, in what unit, and the source of the expected value
+    # quantity, unit, and source of the expected value
     quantity: str
     unit: str
     source: str
@@ -340,8 +343,8 @@ def _verdict(row: Finding | Agreement) -> str:
 def verify(scene: Scene, *, max_seconds: float = PATIENCE) -> Verification:
     """Run a scene on every engine that applies; look at what it is expected to show.
 
-    An engine that gets stuck, or takes longer than `max_seconds`, wall time, is left out. Where
-    none is left, what is expected is not shown: all of it fails.
+    An engine that gets stuck, or takes longer than `max_seconds` of wall time, is left out. If none
+    is left, all expectations fail.
 
     Raises a `SceneError` if the geometry contradicts itself.
     """
@@ -375,7 +378,7 @@ def verify(scene: Scene, *, max_seconds: float = PATIENCE) -> Verification:
         expected = told
         if not isinstance(expect.value, str):
             expected = float(expect.value)
-            # The theory's value of an expectation that comes from elsewhere.
+            # The theory's value of an expectation that has another source.
             if isfinite(told):
                 values["theory"] = told
         for engine, simulated in values.items():

@@ -1,8 +1,8 @@
 """``bench``: run time against error of one scene, a row for each engine and step.
 
-A time without an error is no figure. So each run is held against an answer that its engine had no
-part in, as ``--accuracy`` does (`chutelab.studies.accuracy`), and what has no such answer has no
-row of figures, but says why.
+A time without an error says little. So each run is compared with an answer that its engine had no
+part in, as ``--accuracy`` does (`chutelab.studies.accuracy`). Without such an answer there are no
+figures, but the reason.
 """
 
 from __future__ import annotations
@@ -44,22 +44,22 @@ CROWD = (
     f" this engine and another with the same step, each with and without a change of the inputs by"
     f" {STIR:g}"
 )
-"""How the error is known where particles meet."""
+"""How the error is found if particles meet."""
 
 PACKAGES = ("chutelab", "numpy", "pymunk", "wasmtime", "scipy")
-"""What figures depend on, besides the processor."""
+"""Packages on which figures depend, besides the processor."""
 
 REPEATS = 9
 
 BUDGET = 60.0
-"""s of wall time for all rows together, unless more is asked for: a lesson does not wait longer."""
+"""Default wall time for all rows together, s: a lesson does not wait longer."""
 
 PATIENCE = 0.5
-"""s of repeats of one row, after which no further one is begun."""
+"""After so many s of repeats of one row no further repeat begins."""
 
 LEAST = 0.02
-"""s that a repeat takes at least: what is faster runs several times in a row, and the mean counts,
-as with `timeit`. A single run of a millisecond would measure what others left in the caches."""
+"""Least time of a repeat, s: faster runs are repeated in a row, and the mean counts, as with
+`timeit`. A single run of a millisecond would measure the state of the caches."""
 
 
 @dataclass(frozen=True)
@@ -71,16 +71,16 @@ class Timing:
     value: float | None = None  # the step, s
     first: float | None = None  # s of the first run, imports excluded
     repeats: int = 0  # runs after it
-    median: float | None = None  # of the repeats, s; of the first run if it was too long to repeat
+    median: float | None = None  # median of the repeats, s; the first run if it has no repeats
     error: float | None = None  # relative, the largest of all answers, see `studies.accuracy`
-    quantity: str = ""  # which answer it is the error of
-    against: str = ""  # what it is the difference from: "theory", "dop853" or an engine
+    quantity: str = ""  # the answer with this error
+    against: str = ""  # the reference: "theory", "dop853" or an engine
     how: str = ""  # the error is known, in words
-    failed: str = ""  # why there are no figures, "" if there are
+    failed: str = ""  # why there are no figures; "" if there are
 
 
 def clocked(run: Callable[[], T], number: int = 1) -> tuple[float, T]:
-    """Return the seconds that a call takes, the mean of a number, and what the last returns."""
+    """Return the mean time of some calls, s, and the result of the last."""
     gc.collect()
     begin = perf_counter()
     found = run()
@@ -90,9 +90,9 @@ def clocked(run: Callable[[], T], number: int = 1) -> tuple[float, T]:
 
 
 class Stopwatch:
-    """Repeats of a call whose first run took `first` s, which filled caches too.
+    """Repeats of a call whose first run took `first` s (and filled caches).
 
-    After `patience` s of repeats no further one is begun.
+    After `patience` s of repeats no further one begins.
     """
 
     def __init__(self, run: Callable[[], object], first: float, patience: float) -> None:
@@ -101,7 +101,7 @@ class Stopwatch:
         self._spent = 0.0
 
     def repeat(self) -> None:
-        """Measure once more, unless patience is at its end."""
+        """Measure once more, unless the time for repeats is over."""
         last = self.times[-1] if self.times else self.first
         if self._spent + last <= self.patience:
             number = ceil(LEAST / max(last, 1e-6))
@@ -123,19 +123,18 @@ def measure(
     max_seconds: float = BUDGET,
     progress: Progress | None = None,
 ) -> list[Timing]:
-    """Measure engines on a scene, long steps first; what failed or was left out says why.
+    """Measure engines on a scene, long steps first; failed or omitted rows have the reason.
 
     Parameters
     ----------
     methods : sequence of str
-        Of `METHODS`; by default all, of many particles all but "fixed".
+        Some of `METHODS`; by default all, with many particles all but "fixed".
     steps : sequence of float
         ``run.dt``, s; by default `STEPS` or `MANY_STEPS`. A witness that steps takes the shortest.
     repeats : int
         Timed runs after the first, at most; fewer where they take longer than `PATIENCE`.
     max_seconds : float
-        Wall time of all first runs and of those that tell their errors; what then is not done is
-        left out.
+        Wall time of all first runs and of the runs for their errors; rows beyond it are left out.
     progress : callable, optional
         Called now and then with the share that is done.
     """
@@ -160,7 +159,7 @@ def measure(
         for step in ([None] if method == "exact" else steps)
     ]
     rows: dict[tuple[str, float | None], tuple[Timing, Stopwatch | None]] = {}
-    # All engines with the longest step first: it takes the least, if there is not the time for all.
+    # All engines begin with the longest step, which is the fastest, in case time runs out.
     for method, step in sorted(tasks, key=lambda task: -(task[1] or inf)):
         rows[method, step] = _judged(scene, method, step, search, bounded)
     # The repeats of all rows take turns: other load on the computer then slows all of them.
@@ -179,7 +178,7 @@ def measure(
 def _judged(
     scene: Scene, method: str, step: float | None, search: Search, bounded: Progress
 ) -> tuple[Timing, Stopwatch | None]:
-    """Run once and tell the error before any repeat: a method that fails is not timed."""
+    """Run once and find the error before any repeat: a method that fails is not timed."""
     blank = Timing(method, "" if step is None else "dt", step)
     engine = "pymunk" if method == "fixed" else method
     if step is not None:
@@ -208,7 +207,7 @@ def _judged(
 def environment() -> dict[str, str]:
     """Return processor, number of cores, system, Python and versions of packages.
 
-    What is not installed is left out; no host, user or path is in it.
+    Packages that are not installed are left out; it has no host, user or path.
     """
     cores = os.cpu_count() or 1
     processor = platform.processor() or platform.machine()

@@ -1,4 +1,4 @@
-"""What a lesson's notebook calls: its machine, its runs, what was predicted beside what came out.
+"""What a lesson's notebook calls: its machine, its runs, predictions beside results.
 
 >>> from chutelab.classroom.book import Book
 >>> book = Book("the-parabola")
@@ -6,7 +6,7 @@
 >>> [round(float(one.events["position"][-1, 0]), 3) for one in runs]
 [0.808, 1.615]
 
-A run is said as on the command line, without ``chutelab run``.
+A run is written as on the command line, without ``chutelab run``.
 """
 
 from __future__ import annotations
@@ -42,18 +42,18 @@ if TYPE_CHECKING:
 KNOWN = {"__builtins__": {}, "abs": abs, "nan": nan} | {
     name: getattr(math, name) for name in FUNCTIONS if name != "abs"
 }
-"""What formulas of columns know besides quantities."""
+"""Names in formulas of columns, besides quantities."""
 
 AT_HAND = "--set", "--engine", "--dt"
-"""Options of ``chutelab run`` that a notebook knows, besides ``--details``."""
+"""Options of ``chutelab run`` that a notebook accepts, besides ``--details``."""
 
 
 @dataclass(frozen=True, repr=False)
 class Runs(Shown):
-    """Runs of a lesson: its quantities side by side, and the summary of each to unfold."""
+    """Runs of a lesson: quantities side by side, and the summary of each run to unfold."""
 
     lesson: Lesson
-    recordings: Mapping[str, Recording]  # by what was said
+    recordings: Mapping[str, Recording]  # by the text that was given
     details: bool = False
     noted: Sheet | None = None
     """The table that they fill."""
@@ -90,7 +90,7 @@ def _head(column: Column, said: Words) -> str:
 
 
 def value_of(recording: Recording, column: Column) -> float:
-    """Return what a column tells of a run; NaN where the machine has no such part."""
+    """Return the value of a column for a run; NaN if the machine has no such part."""
     formula = of_quantities(column.value or "nan")
     names = quantities_in(column.value or "nan")
     told = dict.fromkeys(names, nan)
@@ -98,13 +98,13 @@ def value_of(recording: Recording, column: Column) -> float:
         row = lookup(name, recording.scene.places, recording.machine.streams)
         if row is not None and not whose(row, recording.count):
             found = measure(recording, name)
-            # What was not simulated, such as work until no slip, the theory has.
+            # The theory has what was not simulated, such as work until no slip.
             told[name] = predicted(recording.prediction, row) if isnan(found) else found
     return float(eval(compile(formula, "<column>", "eval"), KNOWN, told))
 
 
 class Book:
-    """A lesson as its notebook has it.
+    """A lesson in its notebook.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Book:
         figure = Picture((9.0, 5.0))
         axes = dress(figure.add_subplot(), "x, m", "y, m", self._lesson.title)
         draw_scene(axes, recording.machine, window_of(recording))
-        # The place of separation is an answer, so it is drawn halfway there.
+        # The place of separation is an answer, so the particle is drawn halfway to it.
         released = float(recording.track(0)["t"][0])
         draw_bodies(axes, recording, 0.5 * (released + action(recording)[0]))
         return figure
@@ -213,7 +213,7 @@ class Book:
             recording = simulate(machine_of(self._lesson, one, row))
             cells = []
             for column in one.columns:
-                # What is less than a trillionth is rounding.
+                # Less than a trillionth is rounding.
                 value = number(round(value_of(recording, column), 12)) if column.value else ""
                 cells.append(said.local(str(column.given[n]) if column.given else value))
             head = without_tex(said.local(row.head))
@@ -224,7 +224,7 @@ class Book:
         return self.noted[step]
 
     def explain(self, step: int) -> Explanation:
-        """Return what is said after a step, and to what was expected."""
+        """Return the explanation of a step, and the replies to the predictions."""
         expected, self._expected = self._expected, {}
         return Explanation(self._lesson, expected, self._lesson.steps[step - 1].then)
 
@@ -255,7 +255,7 @@ class Book:
 
 @dataclass(frozen=True, repr=False)
 class Explanation:
-    """What is said after a step; a notebook shows it."""
+    """The explanation after a step; a notebook shows it."""
 
     lesson: Lesson
     expected: Mapping[str, tuple[Ask, Any]]

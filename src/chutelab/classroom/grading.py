@@ -1,11 +1,11 @@
-"""Marks from what students return, and what a class did. It runs notebooks' code.
+"""Marks for the work that students return, and reports of a class. It runs notebooks' code.
 
 Use a container for the notebooks of strangers. A notebook runs in a kernel of its own (`kernel`),
-with limits. What it prints is not looked at: the kernel hands over the numbers that were checked. A
-result file of a lesson's live page has those numbers in it, and nothing of it runs. Both are read
-without trust, and judged again here, against right ones that are computed here. Each file is marked
-by itself, whatever becomes of the others; `write_csv` writes the marks of a class, a row as soon as
-there is one, and `report` what the class did, lesson by lesson.
+with limits. What it prints is ignored: the kernel hands over the numbers that were checked. A
+result file of a lesson's live page contains those numbers, and no code of it runs. Neither is
+trusted: answers are judged again, against right ones computed here. Each file is marked by itself,
+whatever happens to the others. `write_csv` writes the marks of a class, each row as soon as it is
+known, and `report` what the class did, lesson by lesson.
 """
 
 from __future__ import annotations
@@ -63,14 +63,14 @@ class ReturnedError(InputError):
 def _content(path: Path, kind: str, most: int) -> Any:
     """Return the content of a JSON file."""
     try:
-        # Checked before it is opened, since opening triggers some devices, and after, without
-        # waiting: it may have become a pipe.
+        # Check the file before opening it, since opening triggers some devices, and again after
+        # opening it without waiting, as it may have become a pipe.
         regular = stat.S_ISREG(path.stat().st_mode)
         data = b""
         if regular:
             flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
             with os.fdopen(os.open(path, flags), "rb") as file:
-                # Not by the reported size, which may be wrong.
+                # The reported size may be wrong, so count the bytes that are read.
                 regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
                 data = file.read(most + 1) if regular else b""
     except (OSError, ValueError) as error:
@@ -90,10 +90,10 @@ def _content(path: Path, kind: str, most: int) -> Any:
 
 
 def code_of(path: Path) -> list[str | None]:
-    """Return the code cells of a notebook of version 4, None for one whose source is no text.
+    """Return the code cells of a notebook of version 4; None for a cell whose source is not text.
 
-    The JSON is read here and not by nbformat: that refuses a notebook with a cell that has lost its
-    metadata or its source, and what was checked in the other cells counts.
+    The JSON is read here and not by nbformat, which refuses a notebook if one cell has lost its
+    metadata or its source; the other cells should still count.
 
     Raises a `ReturnedError` if it cannot be read.
     """
@@ -145,9 +145,9 @@ Words = Annotated[str, StringConstraints(max_length=LONGEST_TEXT)]
 
 
 class Work(BaseModel):
-    """What a student did in one lesson: numbers and words, no verdicts.
+    """A student's work in one lesson: numbers and words, no verdicts.
 
-    A result file has it, with more that is for the page alone, and the kernel tells it.
+    It comes from a result file, which has more for the page's own use, or from the kernel.
     """
 
     model_config = ConfigDict(strict=True)
@@ -163,7 +163,7 @@ class Work(BaseModel):
 
 
 def _work(found: object) -> Work:
-    """Return what a student did; a `ValueError` says what chutelab would not have written."""
+    """Return a student's work; a `ValueError` names content that chutelab does not write."""
     try:
         work = Work.model_validate(found)
     except ValidationError as error:
@@ -179,7 +179,7 @@ def _work(found: object) -> Work:
 
 
 def result_of(path: Path) -> Work:
-    """Return what is in a result file.
+    """Return the content of a result file.
 
     Raises a `ReturnedError` if it cannot be read, or has content that no page writes.
     """
@@ -212,7 +212,7 @@ class Grade:
     marks: tuple[int, ...] = ()  # 1 for a right answer, 0 for any other or none, by question
     out_of: int = 0  # number of questions
     revealed: tuple[int, ...] = ()  # questions whose working was shown; they count all the same
-    reason: str = ""  # what to know about this row
+    reason: str = ""  # remarks on this row
     answers: Mapping[int, float] = field(default_factory=dict, compare=False)  # by question
     mistakes: Mapping[int, str] = field(default_factory=dict, compare=False)  # known ones
     tries: Mapping[int, int] = field(default_factory=dict, compare=False)  # answers checked
@@ -277,10 +277,10 @@ def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
 
 
 def _copied(row: Grade, before: Sequence[Grade]) -> Iterator[str]:
-    """Say which wrong answers are right for another student's numbers, or the other way round.
+    """Report wrong answers that are right for another student's numbers, or the other way round.
 
-    With each goes how likely it is that this happens without copying: that wrong
-    answers of the one are right for the numbers of any of the others.
+    Each report has the chance of this without copying: that wrong answers of one student are right
+    for the numbers of any of the others.
     """
     others = [one for one in before if one.lesson == row.lesson]
     for other in others:
@@ -301,20 +301,21 @@ def _copied(row: Grade, before: Sequence[Grade]) -> Iterator[str]:
                     all(is_rounded(mine.answers[n], right[n - 1]) for n in found)
                     for right in _drawn(mine.lesson)
                 )
-                # What was never seen may still happen: Laplace's rule of succession, a bound.
+                # An event that was never seen may still happen: Laplace's rule of succession gives
+                # a bound.
                 chance = 1.0 - (1.0 - (seen + 1) / (DRAWS + 2)) ** len(others)
                 likely = f"by chance: {'' if seen else 'at most '}1 in {1.0 / chance:,.0f}"
-                # A bound that is not small says that draws were few, not that it happens.
+                # A bound that is not small only says that there were few draws.
                 likely = "this may be chance" if seen and chance >= LIKELY else likely
                 listed = ", ".join(map(str, found))
                 yield printable(f"answers {listed} {said} ({likely})")
 
 
 LIKELY: Final = 0.05
-"""Chance from which on an answer that is right for another may well be a coincidence."""
+"""From this chance on, an answer that is right for another student may be a coincidence."""
 
 DRAWS: Final = 300
-"""Draws of numbers that tell how often an answer is right for another student."""
+"""Number of made-up students used to find how often an answer is right for another one."""
 
 
 @cache
@@ -327,12 +328,12 @@ def _drawn(lesson: str) -> tuple[tuple[float, ...], ...]:
 
 
 def write_csv(grades: Iterable[Grade], path: str | Path, *, decimal_comma: bool = False) -> Path:
-    """Write a row per grade, as soon as it comes; at the end the file is there, whole.
+    """Write a row per grade, as soon as it is known; at the end the file is complete.
 
-    Until then the rows are in a file beside it, ``NAME.part``. An exception, of `grades` or of the
-    disk, leaves it there if there are marks in it; so does the end of the program. Each row in it
-    is whole. It begins with a byte order mark, from which Excel tells that it is UTF-8;
-    `decimal_comma` is for an Excel whose numbers have one: cells are then apart by semicolons.
+    Until then the rows are in a file beside it, ``NAME.part``. If `grades` or the disk raises an
+    exception, or the program ends, this file stays if it has marks; each row in it is complete. It
+    begins with a byte order mark, by which Excel recognises UTF-8. `decimal_comma` is for versions
+    of Excel with a decimal comma; cells are then separated by semicolons.
 
     Raises a `FileExistsError` if ``NAME.part`` is there: earlier marks, or a grading that still
     runs.
@@ -379,7 +380,7 @@ def write_csv(grades: Iterable[Grade], path: str | Path, *, decimal_comma: bool 
 
 
 def _of_notebook(file: str, time_limit: float) -> Grade:
-    """Mark the lesson and student with most answers of what a notebook reports as worked on.
+    """Mark the lesson and student with the most answers among those that a notebook reports.
 
     Raises a `ForgedError` if that is no report of a chutelab: unknown code ran there.
     """
@@ -438,8 +439,8 @@ _MARKUP: Final = re.compile(r"[\\`*_\[\]<>|&~]")
 def report(grades: Iterable[Grade]) -> str:
     """Return the report of a class as Markdown.
 
-    Files with one name on them all count: two students may have it, or one returned twice, and
-    nothing here can tell. Nothing that a student wrote is markup in it.
+    All files with the same name count: two students may have it, or one returned twice, and this
+    cannot be told apart. Students' texts are not markup in it.
     """
     rows = list(grades)
     lines = ["# Class report", ""]
@@ -493,7 +494,7 @@ def _lesson(name: str, rows: list[Grade]) -> Iterator[str]:
 
 
 def _literal(text: str) -> str:
-    """Return a text in which nothing is Markdown."""
+    """Return a text with all Markdown escaped."""
     return _MARKUP.sub(r"\\\g<0>", " ".join(text.split()))
 
 
@@ -501,7 +502,7 @@ def page(grades: Iterable[Grade]) -> str:
     """Return the report of a class as one HTML page: by lesson, students and their questions.
 
     Each answer is right, a mistake by its name, or a number, with how often it was tried and how
-    many hints were read. Below are what was written, and the files that did not count.
+    many hints were read. Below are the students' texts, and the files that did not count.
     """
     rows = list(grades)
     parts = []

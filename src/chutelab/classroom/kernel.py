@@ -1,14 +1,14 @@
-"""Cells of a notebook, run in a process of their own: watched, limited, ended with all it started.
+"""Run cells of a notebook in a separate process that is watched, limited and ended.
 
 Three processes: the caller of `run`; the watcher, `_watch`; and the kernel, `_work`, which runs the
 cells in a session and a folder of its own. The watcher ends the kernel and its descendants when the
-kernel is through, takes too much, or `run` is gone. A cell that signals its parent hits the
-watcher, which takes no signals. What the cells print goes nowhere. The kernel tells what was
-checked through a pipe, a JSON object a line; students' code can write there too, so nothing of it
-is believed unchecked.
+kernel has finished, takes too much, or `run` is gone. A cell that signals its parent signals the
+watcher, which ignores signals. What the cells print is discarded. The kernel reports the checked
+answers through a pipe, one JSON object per line; students' code can write there, too, so everything
+is checked.
 
-This keeps accidents and clumsy tricks from the computer, not from attackers: the cells run with
-all rights of the caller.
+This protects the computer against accidents and clumsy tricks, not against attackers: the cells run
+with all rights of the caller.
 """
 
 from __future__ import annotations
@@ -51,25 +51,25 @@ PATIENCE: Final = 10.0
 """s for the watcher to end everything and remove the folder; it takes a hundredth of it."""
 
 OFTEN: Final = 0.5
-"""s between two times that the kernel hands over what there is new while a cell runs."""
+"""s between two reports of the kernel while a cell runs."""
 
 PERIOD: Final = 0.1
-"""s between two looks of the watcher."""
+"""s between two checks of the watcher."""
 
 LONGEST_LINE: Final = 256 << 10
-"""Bytes that the kernel may say at a time: the answers of 64 tasks are 30 kB."""
+"""Most bytes of one report of the kernel: the answers of 64 tasks are 30 kB."""
 
 MOST_SAID: Final = 8 << 20
-"""Bytes that the kernel may say in all."""
+"""Most bytes of all reports of the kernel."""
 
 LONGEST: Final = 200
-"""Characters of an error that are told."""
+"""Most characters of a reported error."""
 
 PACKAGES: Final = Path(__file__).parents[2]
-"""Where this chutelab lies, for the kernel to find it too."""
+"""The folder of this chutelab, for the kernel to find it, too."""
 
 NAME: Final = "chutelab.classroom.kernel"
-"""This module, also where it is run as a program."""
+"""Name of this module, also when it is run as a program."""
 
 ENDS: Final = {
     0: "",
@@ -78,7 +78,7 @@ ENDS: Final = {
     (LEFT := 5): "some processes that it started could not be ended",
     (SIGNALLED := 6): "it sent its parent process a signal",
 }
-"""Exit codes of the watcher, and what they say of the notebook."""
+"""Exit codes of the watcher, and their meaning for the notebook."""
 
 _POSIX: Final = os.name == "posix"
 _PR_SET_PDEATHSIG: Final = 1
@@ -86,27 +86,27 @@ _PR_SET_CHILD_SUBREAPER: Final = 36
 
 
 class ForgedError(ValueError):
-    """What came from the kernel is not what a chutelab there says; the text says why."""
+    """A report from the kernel was not written by chutelab; the text says why."""
 
 
 @dataclass(frozen=True)
 class Ran:
-    """What became of a notebook."""
+    """Result of running a notebook."""
 
-    # what `report` in `classroom.exercises` gave, unchecked: student's code ran there
+    # what `report` in `classroom.exercises` gave; not checked, as students' code ran there
     tasks: object
-    trouble: str  # what went wrong, or empty; of errors the first
+    trouble: str  # what went wrong (the first error), or empty
 
 
 def run(cells: Sequence[str | None], time_limit: float) -> Ran:
-    """Run code cells in order; what raises an error does not keep the rest from running.
+    """Run code cells in order; after an error in one the others still run.
 
-    None is a cell whose source is no text. `time_limit` is in s for all cells together, the
-    kernel's start not counted. Raises a `ForgedError` if the kernel says what no chutelab says; an
-    `OSError` if no process can be started.
+    None stands for a cell whose source is not text. `time_limit` is in s for all cells together,
+    without the kernel's start. Raises a `ForgedError` if the kernel reports what chutelab would
+    not; an `OSError` if no process can be started.
     """
     paths = [str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])]
-    # Threads of linear algebra take memory each, more of it the more cores there are.
+    # Each thread of linear algebra takes memory, and there are as many as cores.
     alone = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     watcher = subprocess.Popen(
         [sys.executable, "-P", "-m", NAME, "watch"],
@@ -130,7 +130,7 @@ def run(cells: Sequence[str | None], time_limit: float) -> Ran:
     finally:
         ended = _end(watcher, heard.folder)
         listener.join(PERIOD)
-        # Left open where a process that got away still holds the other end.
+        # It stays open if an escaped process still holds the other end.
         if not listener.is_alive():
             watcher.stdout.close()
     troubles = [heard.trouble, ENDS.get(ended, "")]
@@ -140,9 +140,9 @@ def run(cells: Sequence[str | None], time_limit: float) -> Ran:
 
 
 def _listen(pipe: int, said: SimpleQueue[bytes | None]) -> None:
-    """Pass on what arrives, line by line, then None; an empty line stands for too much of it."""
+    """Pass on what arrives line by line, then None; an empty line means that there was too much."""
     rest, arrived = b"", 0
-    # Not through a file object: it could not be closed while a thread waits in it.
+    # No file object: it could not be closed while a thread waits in it.
     while chunk := os.read(pipe, 1 << 16):
         arrived += len(chunk)
         *lines, rest = (rest + chunk).split(b"\n")
@@ -155,7 +155,7 @@ def _listen(pipe: int, said: SimpleQueue[bytes | None]) -> None:
 
 
 class _Heard:
-    """What has been heard of one kernel."""
+    """Reports of one kernel so far."""
 
     def __init__(self, time_limit: float) -> None:
         self.time_limit = time_limit
@@ -164,7 +164,7 @@ class _Heard:
         self.trouble = ""
 
     def follow(self, said: SimpleQueue[bytes | None]) -> None:
-        """Listen to what is said, until the end or until the time is up."""
+        """Listen to reports, until the end or until the time is up."""
         until = monotonic() + START
         cell = -1  # -1 before the kernel has started, 0 before the first cell
         while True:
@@ -229,7 +229,7 @@ def _end(watcher: subprocess.Popen[bytes], folder: str) -> int:
 
 
 def _remove(folder: str) -> None:
-    """Remove a folder, however deep: folders in it move up, and go when they hold no other."""
+    """Remove a folder of any depth: inner folders move up, and go when they hold no other."""
     top = Path(folder)
     with suppress(OSError):
         top.chmod(0o700)
@@ -251,14 +251,14 @@ def _folders(folder: Path) -> list[Path]:
 
 
 def _watch() -> None:
-    """Run the kernel until it is through, takes too much, or standard input ends."""
+    """Run the kernel until it has finished, takes too much, or standard input ends."""
     import psutil
 
     asked = sys.stdin.buffer.readline()
     if not asked.endswith(b"\n"):
         return
     if _POSIX:
-        # Those that leave the kernel's session, and their parents, still come back here.
+        # Orphans that left the kernel's session become children of this process.
         _prctl(_PR_SET_CHILD_SUBREAPER, 1)
         signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
     code = 0
@@ -298,7 +298,7 @@ def _watch() -> None:
                 code = TOO_MUCH
                 break
         if _POSIX:
-            # All of them at once, or a process that forks faster than this kills would stay ahead.
+            # All at once, or a process that forks faster than this kills would survive.
             with suppress(ProcessLookupError):
                 os.killpg(kernel.pid, signal.SIGKILL)
         until = monotonic() + PATIENCE / 2
@@ -314,7 +314,7 @@ def _watch() -> None:
             code = SIGNALLED
     finally:
         _remove(folder)
-        # Not through the interpreter's end: a thread still reads standard input.
+        # Not by the interpreter's normal end, since a thread still reads standard input.
         os._exit(code)
 
 
@@ -334,7 +334,7 @@ def _any_left() -> bool:
     """Tell whether a descendant of this process is left; children that are over are reaped.
 
     A list of processes may miss one whose parent ends while the list is made. But where orphans
-    come back to this process, there is a child of it as long as there is any descendant.
+    become children of this process, it has a child as long as there is any descendant.
     """
     if _POSIX:
         try:
@@ -390,7 +390,7 @@ def _work() -> None:
             """Do nothing: there are no windows."""
 
         def ask_exit(self) -> None:
-            """Do nothing: the next cell has its turn."""
+            """Do nothing: the next cell runs."""
 
     config = Config()
     config.HistoryManager.enabled = False
@@ -405,7 +405,7 @@ def _work() -> None:
             _say(pipe, **message)
 
     def hand_over() -> None:
-        # Cells can change this module; what comes of it is judged anew.
+        # Cells can change this module; its results are judged again elsewhere.
         with suppress(Exception), turn:
             found = exercises.report()
             if last != found:
@@ -413,7 +413,7 @@ def _work() -> None:
                 last[:] = found
 
     def watch_time() -> None:
-        # Now and then too: a cell may end the kernel, or let no other thread run.
+        # Report now and then as well: a cell may end the kernel, or let no other thread run.
         until = monotonic() + time_limit
         while (left := until - monotonic()) > 0.0:
             sleep(min(left, OFTEN))
@@ -429,7 +429,7 @@ def _work() -> None:
                     code = shell.transform_cell(source)  # type: ignore[no-untyped-call]
                     ran = await shell.run_cell_async(source, transformed_cell=code)
                     error = ran.error_before_exec or ran.error_in_exec
-            except BaseException as raised:  # whatever it is, the next cell has its turn
+            except BaseException as raised:  # whatever it is, the next cell runs
                 error = raised
             if error is not None:
                 name = type(error).__name__
@@ -444,7 +444,7 @@ def _work() -> None:
     asyncio.run(go())
     hand_over()
     tell(end=True)
-    # Threads and what is registered for the end do not keep it.
+    # Do not wait for threads or exit handlers.
     os._exit(0)
 
 

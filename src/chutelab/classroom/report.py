@@ -1,9 +1,10 @@
-"""A report on a scene for those who have to decide or to learn: what was put in, what came out.
+"""A report on a scene: inputs and results, for clients and for students.
 
 The engineer's view has all of it: drawing, inputs with their sources, assumptions and what they
 leave out, results, envelope, loads, power beside ISO 5048 and DIN 22101, wear, sensitivities, and
 how to make it again. The teacher's view is the skeleton of a lab report, with empty boxes. It is
-written as Markdown with pictures, and printed as lessons are. Its numbers are the registry's.
+written as Markdown with pictures, and printed like lessons. Its quantities are those of the
+registry.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ from chutelab.util.words import words as words_of
 View = Literal["engineer", "teacher"]
 
 LOADS: Final = 0.01
-"""s; bins of loads where the scene does not say."""
+"""s; bins of loads if the scene gives none."""
 
 MOST: Final = 26
 """Rows of the table of inputs, at most; the scene file has the rest."""
@@ -60,20 +61,20 @@ CHANGED: Final = 0.01
 """Share by which a key is changed, up and down, for its sensitivity; angles by so many radians."""
 
 ROUNDING: Final = 1e-9
-"""Share of a result; smaller changes of it are told as none."""
+"""Share of a result; smaller changes of it are reported as none."""
 
 TURNED: Final = (
     "incoming.speed", "incoming.pulley_radius", "plate.angle_deg", "plate.restitution",
     "plate.distance", "outgoing.speed", "outgoing.drop", "outgoing.friction", "particle.radius",
 )  # fmt: skip
-"""Keys whose sensitivities are told, where the scene gives them."""
+"""Keys whose sensitivities are reported, if the scene has them."""
 
 TOLD: Final = (
     "landing.x", "landing.vx", "landing.vy", "impact.t", "ledger.power", "power",
     "ledger.restitution_loss", "ledger.friction_loss", "loads.plate.normal.peak",
     "loads.plate.normal.mean", "loads.outgoing.normal.mean", "misses",
 )  # fmt: skip
-"""What results, sensitivities and the skeleton are of, where the scene has it."""
+"""Quantities of results, sensitivities and the skeleton, if the scene has them."""
 
 
 @dataclass
@@ -107,7 +108,7 @@ class Report:
         self.tables[name] = sheet
         width = len(sheet.columns)
         lines = [sheet.columns, ("---",) * width, *sheet.rows, *sheet.foot]
-        # Only what a student fills in is empty, and has room.
+        # Only cells that a student fills in are empty, and have room.
         empty = "" if name == "values" else "–"
         made = ""
         for n, row in enumerate(lines):
@@ -118,7 +119,7 @@ class Report:
         return f"{made}\n{said}".rstrip()
 
     def picture(self, name: str, figure: Any, said: str) -> str:
-        """Keep a picture, and return what shows it."""
+        """Keep a picture, and return the Markdown that shows it."""
         self.pictures[name] = figure
         return f"![{said}]({name}.png)"
 
@@ -158,7 +159,7 @@ class Report:
 
 
 def _plain(text: str) -> str:
-    """Return a text without what Markdown would take for markup."""
+    """Return a text with Markdown's markup escaped."""
     return re.sub(r"([\\`*_$\[\]<>#])", r"\\\1", text.rstrip("."))
 
 
@@ -177,22 +178,22 @@ def report(
     Parameters
     ----------
     scene, changes
-        As `chutelab.simulate` takes them; loads are counted in bins of 0.01 s unless it says.
+        As `chutelab.simulate` takes them; loads have bins of 0.01 s unless the scene gives them.
     view : {"engineer", "teacher"}
         The whole report, or the skeleton of a lab report.
     runs : int
-        With how many seeds results are told as mean ± standard error; 1 for the scene's own alone.
+        Number of seeds for results as mean ± standard error; 1 for the scene's own seed only.
     engine : str, optional
         Overrides ``run.engine``.
     command : str
-        What makes the report again, as it stands in it.
+        The command that makes the report again, printed in it.
     language : str
         Of the teacher's view, such as "de"; the engineer's is in English.
 
     Raises
     ------
     InputError
-        If the view is not there in the language.
+        If the view does not exist in the language.
     """
     if language != "en" and view != "teacher":
         raise InputError("the engineer's view is in English, en", "language", language)
@@ -265,7 +266,7 @@ def _for_students(made: Report) -> None:
 
 
 def inputs(scene: Scene, words: Words) -> Sheet:
-    """Return what the scene file gives, key by key, with unit and where it is from."""
+    """Return the values in the scene file, key by key, with unit and source."""
     rows, from_file = [], words.say("lab-from-scene")
     for key, value in _leaves(to_dict(scene)):
         if key.split(".")[0].split("[")[0] in ("title", "expect", "live", "view", "sensor"):
@@ -323,7 +324,7 @@ def materials(made: Report) -> str:
 
 
 def left_out(made: Report) -> list[str]:
-    """Return what is assumed and left out, with its size where it is known."""
+    """Return what is assumed and left out, and how much it matters if that is known."""
     recording, scene = made.recording, made.scene
     share = recording.ledger.relative_residual
     said = [
@@ -347,7 +348,7 @@ def left_out(made: Report) -> list[str]:
 
 
 def _values(recording: Recording) -> Iterator[tuple[str, str, str, float]]:
-    """Yield name, meaning, unit and value of `TOLD`, of a stream its mean."""
+    """Yield name, meaning, unit and value of each of `TOLD`; of a stream its mean."""
     for name in TOLD:
         for one in (name, f"{name}.mean"):
             row = lookup(one, recording.scene.places, recording.machine.streams)
@@ -412,7 +413,7 @@ def power(recording: Recording) -> Sheet | None:
 
 
 def wear(recording: Recording) -> Sheet:
-    """Return sums of wear of each surface, and where the most of it is."""
+    """Return the sums of wear of each surface, and where it is largest."""
     rows = []
     for name, one in touched(recording).items():
         sums = [float(getattr(one, key).sum()) for key in KEYS]

@@ -1,11 +1,10 @@
-"""The command ``chutelab`` itself, what all commands print, and what becomes of errors.
+"""The command ``chutelab`` itself, the output of all commands, and the handling of errors.
 
 Text and JSON go to standard output, a progress bar, which appears after a second, to standard
-error. Exit codes: 0: done. 1: something failed that is not the user's to mend, ``verify`` or
-``stress`` found what does not hold, a run broke a law, or an accuracy was not reached.
-2: what the user gave cannot be used. 130: interrupted with Ctrl-C. 143: terminated.
-129: the terminal was closed. 143 and 129 leave nothing behind, and so does 130, but for what a
-``run --out`` had recorded.
+error. Exit codes: 0: done. 1: chutelab failed, ``verify`` or ``stress`` found a broken promise, a
+run broke a law, or an accuracy was not reached. 2: invalid input. 130: interrupted with Ctrl-C.
+143: terminated. 129: the terminal was closed. 143 and 129 leave no files behind; 130 leaves only
+those of what ``run --out`` had recorded.
 """
 
 from __future__ import annotations
@@ -57,7 +56,7 @@ class _Output(io.TextIOWrapper):
 
 
 class _Errors(io.TextIOWrapper):
-    """Standard error. If it cannot be written, only the exit code tells of it."""
+    """Standard error. If it cannot be written, only the exit code shows that."""
 
     def write(self, text: str, /) -> int:
         with suppress(OSError):
@@ -72,8 +71,8 @@ class _Errors(io.TextIOWrapper):
 def open_streams() -> None:
     """Make the standard streams safe to write to, whatever they are.
 
-    One that is closed becomes the null device: else the next file that is opened gets its number,
-    and with it all output. A title in Greek does not fail in a terminal that has no Greek.
+    A closed stream becomes the null device; otherwise the next file that is opened would get its
+    number, and all output. Characters that the terminal's encoding lacks are replaced.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         stream = getattr(sys, name)
@@ -96,13 +95,13 @@ def open_streams() -> None:
 def say(text: str, *, err: bool = False, end: str = "\n") -> None:
     """Print a text; control characters in titles and names are escaped.
 
-    All text goes through here, or through `show`.
+    All text is printed here or by `show`.
     """
     click.echo(f"{printable_lines(text)}{end}", err=err, nl=False)
 
 
 class _Shown:
-    """What rich prints of something, with control characters escaped, colours aside."""
+    """What rich prints for an object, with control characters escaped except colours."""
 
     def __init__(self, part: RenderableType) -> None:
         self.part = part
@@ -121,7 +120,7 @@ def show(*parts: RenderableType) -> None:
     console = Console(highlight=False, emoji=False)
     with console.capture() as capture:
         for part in parts:
-            # Escaped characters take more room: lines are not cut for that.
+            # Escaped characters take more room; lines are not cut for that.
             console.print(_Shown(part), crop=False)
     # click flushes, and handles a closed pipe.
     click.echo(capture.get().removeprefix("\n"), nl=False)
@@ -151,7 +150,7 @@ def tell(
 
 
 PATIENCE = 1.0
-"""s before a bar appears: shorter work needs none, nor the time its import takes."""
+"""s before a bar appears; shorter work does not need it, nor the import."""
 
 
 @contextmanager
@@ -235,9 +234,9 @@ class Program(click.Group):
         return ORDER
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
-        """Run the program, and exit; what goes wrong becomes a message and an exit code.
+        """Run the program, and exit; errors become a message and an exit code.
 
-        Without `standalone_mode` neither, as in click.
+        Without `standalone_mode` errors are raised, as in click.
         """
         asked, ends = {"debug": False}, kwargs.get("standalone_mode", True)
         kwargs |= {"obj": asked, "standalone_mode": False}
@@ -269,11 +268,11 @@ class Program(click.Group):
 
 
 EXPECTED = (click.ClickException, InputError, MissingLibraryError)
-"""Errors that ``--debug`` shows without a traceback, too."""
+"""Errors shown without a traceback even with ``--debug``."""
 
 
 def _told(error: BaseException) -> int:
-    """Say on standard error what went wrong; return the exit code."""
+    """Print an error on standard error; return the exit code."""
     if code := exit_code(error):
         say("Interrupted." if code == INTERRUPTED else "Terminated.", err=True)
         return code

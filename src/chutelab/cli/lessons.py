@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def complete_lesson(begun: str) -> list[CompletionItem]:
-    """Offer the names of shipped lessons that begin so, with or without their number."""
+    """Offer the shipped lessons whose names, with or without number, begin with a text."""
     from chutelab.classroom.lessons import shipped_lessons
 
     found = shipped_lessons()
@@ -42,7 +42,7 @@ def complete_lesson(begun: str) -> list[CompletionItem]:
 HEADS = ("file", "student", "lesson", "marks (*: working shown)", "remarks")
 
 MOST_NAMED = 8
-"""Files of a folder that are told to be left out, at most."""
+"""Most files of a folder that are listed as left out."""
 
 LessonName = Annotated[str, FileName(), complete_lesson]
 LessonNames = Annotated[Texts, FileName(), complete_lesson]

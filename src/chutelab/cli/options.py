@@ -1,4 +1,4 @@
-"""Options of commands, said once: type and default in the signature, the rest in the docstring.
+"""Options of commands, defined once: type and default in the signature, the rest in the docstring.
 
 ::
 
@@ -11,8 +11,9 @@
         '''
 
 Parameters before the star are arguments. A tuple may be given several times, a `bool` is a flag, a
-`Literal` a choice; ``Annotated`` adds how a value is read, or how a shell completes it. What is not
-in the docstring is one of `SHARED`. A parameter that is a dataclass stands for all its fields.
+`Literal` a choice; ``Annotated`` adds how a value is read, or how a shell completes it. Options
+that are not in the docstring are in `SHARED`. A parameter that is a dataclass stands for all its
+fields.
 """
 
 from __future__ import annotations
@@ -72,9 +73,9 @@ _ENTRY = re.compile(r"^(-.*?)  +(.*(?:\n    .*)*)\n?", re.MULTILINE)
 
 
 class Command(click.Command):
-    """A command of a function; what its docstring says is read when it is first asked for.
+    """A command made from a function; its docstring is read when it is first needed.
 
-    That is so of one command at most, whether it runs or its help is shown.
+    At most one command per process needs it, whether it runs or its help is shown.
     """
 
     callback: Callable[..., None]
@@ -86,17 +87,17 @@ class Command(click.Command):
 
     @cached_property
     def params(self) -> list[click.Parameter]:  # type: ignore[override]
-        """What the function takes."""
+        """The parameters of the function."""
         return list(_parameters(self.callback, self._parts))
 
     @cached_property
     def help(self) -> str:  # type: ignore[override]
-        """What the docstring says besides the options."""
+        """The docstring without the options."""
         text = _ENTRY.sub("", cleandoc(self.callback.__doc__ or ""))
         return re.sub(r"\n\n+(?=chutelab |.*\n +\S)", "\n\n\b\n", text)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Call the function, with its dataclasses made of their fields."""
+        """Call the function; its dataclasses are built from their fields."""
         for name, kind in self._parts.items():
             fields = {one: ctx.params.pop(one) for one in signature(kind).parameters}
             ctx.params[name] = kind(**fields)
@@ -106,7 +107,7 @@ class Command(click.Command):
 def command(
     short: str | None = None, group: click.Group = main, *, cls: type[Command] = Command
 ) -> Callable[[Callable[..., None]], Command]:
-    """Make a command of a group of a function, whose docstring becomes its help.
+    """Make a function a command of a group; its docstring becomes the help.
 
     Paragraphs that begin with ``chutelab``, or have indented lines, keep their lines.
     """
@@ -120,7 +121,7 @@ def command(
 
 
 def _parameters(taker: Callable[..., Any], parts: dict[str, Any]) -> Iterator[click.Parameter]:
-    """Yield what a function or a dataclass takes; note in `parts` the dataclasses among it."""
+    """Yield the parameters of a function or a dataclass; note its dataclasses in `parts`."""
     entries = _ENTRY.findall(SHARED) + _ENTRY.findall(cleandoc(taker.__doc__ or ""))
     told = {re.findall("--([a-z0-9-]+)", form)[0]: (form, text) for form, text in entries}
     hints = get_type_hints(taker, include_extras=True)
@@ -170,7 +171,7 @@ def _parameters(taker: Callable[..., Any], parts: dict[str, Any]) -> Iterator[cl
 
 
 def complete_scene(begun: str) -> list[CompletionItem]:
-    """Offer the shipped scenes that begin so, and files."""
+    """Offer the shipped scenes that begin with a text, and files."""
     from chutelab.scene import about
 
     titles = {scene.name: scene.title for scene in about()}
@@ -178,7 +179,7 @@ def complete_scene(begun: str) -> list[CompletionItem]:
 
 
 def beginning(told: Mapping[str, str], begun: str) -> list[CompletionItem]:
-    """Offer the names that begin so, with what is told of each."""
+    """Offer the names that begin with a text, each with its description."""
     return [CompletionItem(n, help=text) for n, text in told.items() if n.startswith(begun)]
 
 
@@ -195,7 +196,7 @@ class Count(click.IntRange):
 
 
 DEEPEST = 200
-"""Most folders inside each other in a name: making them is recursive."""
+"""Most nested folders in a name, since making them is recursive."""
 
 
 class FileName(click.Path):
@@ -246,7 +247,7 @@ def loaded_as_told(
     dt: float | None = None,
     loads: float | None = None,
 ) -> Scene:
-    """Load a scene changed by ``--set`` and the options that are keys; the title names changes."""
+    """Load a scene changed by ``--set`` and by options for keys; the title names the changes."""
     from chutelab.scene import load
     from chutelab.scene.overrides import Override
 
@@ -279,8 +280,8 @@ def retitled(scene: Scene, changes: Sequence[str]) -> Scene:
 def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path | None]:
     """Give an empty folder to write to; at the end its files move to `folder`, made if need be.
 
-    Enter it before a long run: a `folder` that cannot be written to, is no folder, or has folders
-    called like the files, `names`, is refused at once. None stays None.
+    Enter it before a long run: a `folder` that cannot be written to, is not a folder, or has
+    folders with the names of the files (`names`) is refused at once. None stays None.
     """
     if folder is None:
         yield None
@@ -299,7 +300,7 @@ def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path
 
 
 def check_file(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> None:
-    """Refuse, before anything runs, the file of an option if it cannot be written.
+    """Refuse the file of an option, before anything runs, if it cannot be written.
 
     With `suffixes` it must end in one of them.
     """
@@ -361,7 +362,7 @@ def _spaced(first: float, last: float, written: str, typed: str) -> tuple[float,
         return (first,)
     if first == last:
         raise InputError(f"the range is empty: from {first:g} to {last:g}", typed)
-    # Rounded: 0.3 is 0.3, not 0.30000000000000004, and what rounding leaves of a 0 is a 0.
+    # Rounded, so that 0.3 is not 0.30000000000000004 and a rounded 0 is 0.
     nothing = 1e-13 * max(abs(first), abs(last))
     inside = (first + (last - first) * i / (count - 1) for i in range(1, count - 1))
     rounded = (0.0 if abs(value) < nothing else float(f"{value:.12g}") for value in inside)

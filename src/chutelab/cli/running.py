@@ -54,22 +54,23 @@ KINDS = {
     "loads": ("loads.csv", "loads.png"),
     "wear": ("wear.csv", "wear.png"),
 }
-"""What ``--only`` takes, and the files it stands for."""
+"""The kinds that ``--only`` takes, and their files."""
 
 LOADS = 0.01
-"""s; bins of loads where ``--only`` asks for their files and nothing says how long they are."""
+"""s; bins of loads if ``--only`` asks for them and nothing gives their width."""
 
 FILMS = ("gif", "mp4", "webm")
 """Kinds of the lesson picture; ``--format`` chooses one."""
 
 PICTURED = {*FILMS, "png", "strobe", "sensors", "loads", "wear"}
-"""Kinds in which something is drawn."""
+"""Kinds that are drawn."""
 
 USUAL = ("png", "gif", "csv", "npz", "json")
 """Kinds that are written without ``--only``."""
 
 MOST_EVENTS, EVENT = 100_000, 240
-"""Rows, and bytes of each, about: a longer events.csv is written only if ``--only`` asks for it."""
+"""Rows, and bytes per row (about): a longer events.csv is written only if ``--only`` asks for
+it."""
 
 
 def complete_kinds(incomplete: str) -> list[CompletionItem]:
@@ -80,10 +81,10 @@ def complete_kinds(incomplete: str) -> list[CompletionItem]:
 
 @dataclass(kw_only=True)
 class Output:
-    """What ``run`` and ``show`` leave of a recording.
+    """Output of ``run`` and ``show`` for a recording.
 
-    Refused are ``--only`` and ``--format`` where nothing is written, ``--format`` where there is no
-    film, and a film that cannot be written here.
+    ``--only`` and ``--format`` are refused if nothing is written, ``--format`` if there is no film,
+    and a film that cannot be written here.
 
     --out DIR  Write pictures, tables and the recording into this folder.
     --only KINDS  With --out: only some of png,gif,csv,npz,json,mp4,webm,strobe,sensors,loads,wear;
@@ -113,7 +114,7 @@ class Output:
     quiet: bool
     language: Literal["en", "de"] = "en"
     kinds: tuple[str, ...] = field(init=False)  # which of `KINDS`
-    coefficients: dict[str, float] = field(init=False)  # of wear, those that are given
+    coefficients: dict[str, float] = field(init=False)  # coefficients of wear, if given
 
     def __post_init__(self) -> None:
         chosen = {kind.strip().lower() for value in self.only for kind in value.split(",")}
@@ -158,7 +159,7 @@ class Output:
         return [name for kind in self.kinds for name in KINDS[kind]]
 
     def leaves_out(self, recording: Recording) -> bool:
-        """Tell whether there are so many events that events.csv is not written unasked."""
+        """Whether there are so many events that events.csv is written only on request."""
         return "csv" in self.kinds and not self.only and len(recording.events) > MOST_EVENTS
 
     def write(self, recording: Recording, folder: Path, accuracy: Accuracy | None = None) -> None:
@@ -197,7 +198,7 @@ class Output:
                 elif kind == "npz":
                     recording.save(path)
                 else:
-                    # No computing time in the file, so that the same run gives the same file.
+                    # The file has no computing time, so that the same run gives the same file.
                     write_json({**_summary(recording, accuracy), "seconds": None}, path)
 
     def tell(self, recording: Recording, accuracy: Accuracy | None = None) -> None:
@@ -238,7 +239,7 @@ class Output:
 def _report(
     recording: Recording, accuracy: Accuracy | None, *, details: bool
 ) -> list[RenderableType]:
-    """Return what a run leaves to read: particle 0 beside the theory, the ledger, the accuracy.
+    """Return the report of a run: particle 0 beside the theory, the ledger, the accuracy.
 
     With `details` also the engine and its steps, and errors down to rounding.
     """
@@ -291,17 +292,17 @@ def run(
     same, and the exit code is 1.
 
     Every run is judged: numbers are finite, nothing is inside a surface or passes one, energy rises
-    only by drives, no loss is negative, the ledger closes. A law that is broken is told, and the
-    exit code is 1; what is printed and written says so. Without --engine another engine runs then,
-    if there is one that keeps the laws, and the summary says so.
+    only by drives, no loss is negative, the ledger closes. A broken law is reported in all that is
+    printed and written, and the exit code is 1. Without --engine another engine then runs, if one
+    keeps the laws, and the summary says so.
 
     A run that --max-seconds ends counts as a run: its summary and files are of what was recorded,
     particles that had not ended have "stopped" as their end, and the exit code is 0. Ctrl-C ends a
     run the same way: with --out its files are written, and the exit code is 130.
 
-    With --repeat N seeds run, each quantity is told as mean ± standard error, and --out has
-    repeats.csv, a row for each seed, repeats.png and repeats.json. After --max-seconds, or
-    Ctrl-C, no further seed begins.
+    With --repeat N seeds run, each quantity is given as mean ± standard error, and --out has
+    repeats.csv, a row for each seed, repeats.png and repeats.json. After --max-seconds, or Ctrl-C,
+    no further seed begins.
 
     chutelab run stream --repeat 12 --jobs 0
 
@@ -394,7 +395,7 @@ REPEATED = ("repeats.csv", "repeats.png", "repeats.json")
 def _repeated(
     scene: Scene, count: int, jobs: int, max_seconds: float | None, output: Output
 ) -> None:
-    """Run a scene with many seeds; exit with 1 if some have no numbers that can be believed."""
+    """Run a scene with many seeds; exit with 1 if some runs have no reliable numbers."""
     from chutelab.studies.repeats import repeat
 
     interrupted = None
@@ -458,8 +459,8 @@ def live(
 ) -> None:
     """Show SCENE as a live page: drag the plate, and path, numbers and ledger follow.
 
-    Without SCENE it opens an empty picture with parts to build a machine of, and examples. Of a
-    scene with mass points, or with boxes and polygons beside what only the pymunk engine has with
+    Without SCENE it opens an empty picture with parts to build a machine from, and examples. If a
+    scene has mass points, or boxes and polygons with features that only the pymunk engine has for
     them, it says what it cannot show, and opens the rest.
 
     It is one HTML file with the contact engine in it, the same as in `chutelab run --engine

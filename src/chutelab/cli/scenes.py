@@ -1,8 +1,7 @@
-"""Scenes: what you need to write one, whether one is to be trusted, and the paper's tables.
+"""Commands for writing scenes, for checking scenes and runs, and for the paper's tables.
 
-``scenes``, ``materials``, ``quantities``, ``schema`` and ``new``; ``tables`` and ``figure``, the
-paper's as printed beside computed; ``check``, ``verify``, ``stress`` and ``bench``: is a scene, an
-answer, a run right.
+``scenes``, ``materials``, ``quantities``, ``schema`` and ``new``; ``check``, ``verify``, ``stress``
+and ``bench``; ``tables`` and ``figure``, the paper's as printed beside computed.
 """
 
 from __future__ import annotations
@@ -59,7 +58,7 @@ def scenes(*, json_: bool) -> None:
 
 
 def complete_material(begun: str) -> list[CompletionItem]:
-    """Offer the materials that begin so."""
+    """Offer the materials that begin with a text."""
     from chutelab.scene.materials import presets
 
     return beginning({name: preset.about for name, preset in presets().items()}, begun)

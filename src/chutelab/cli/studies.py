@@ -43,7 +43,7 @@ from chutelab.util.files import csv_lines, write_lines, writing
 
 
 def complete_column(begun: str) -> list[CompletionItem]:
-    """Offer the columns of a sweep that begin so."""
+    """Offer the columns of a sweep that begin with a text."""
     from chutelab.scene.quantities import COLUMNS
 
     return beginning({name: row.meaning for name, row in COLUMNS.items()}, begun)
@@ -84,7 +84,7 @@ def sweep(
     json_: bool,
     quiet: bool,
 ) -> None:
-    """Simulate all variants of SCENE and say what happened in each.
+    """Simulate all variants of SCENE and write a row of results for each.
 
     A variant that is impossible, or misses the outgoing belt, is a row with its reason. Rows that
     are finished are kept beside --out FILE until all are: --resume goes on after an interruption,
@@ -95,12 +95,13 @@ def sweep(
     particles meet, in order, up to the landing; bounces in a row on one count once) and reason
     (why there are no numbers, or not all). Maps are hatched where no particle meets the plate.
 
-    With --uncertainty, statistics are also told by what is touched: a stream that misses the plate
-    in half of all cases has two kinds of outcome, and their mean may be near to neither.
+    With --uncertainty, statistics are also given for each sequence of surfaces touched: a stream
+    that misses the plate in half of all cases has two kinds of outcome, and their mean may be near
+    to neither.
 
-    What the ledger has is counted up to run.until, which is the landing unless said: a slip that
-    goes on after it is not in it. With --set run.until=settled it is, as it always is in belt_work
-    and slip_heat, of chutelab solve and with --uncertainty.
+    The ledger counts up to run.until, by default the landing, so it leaves out slip after that.
+    With --set run.until=settled this slip is included, as it always is in belt_work and slip_heat,
+    in chutelab solve and with --uncertainty.
 
     With --repeat columns are means over the seeds, NAME.error is the standard error of NAME, and
     pictures have bars.
@@ -109,7 +110,7 @@ def sweep(
 
     --vary KEY=FROM:TO:COUNT  A key of the scene and its values, such as plate.angle_deg=0:60:61 or
         incoming.speed=2,4. May be repeated: all combinations are simulated.
-    --uncertainty KEY=VALUE±SPREAD  Instead of --vary: what is not exactly known, such as
+    --uncertainty KEY=VALUE±SPREAD Instead of --vary: an uncertain key, such as
         plate.restitution=0.5±0.05, where 0.05 is the standard deviation (with :uniform at the end
         the half-width). Says how uncertain that makes landing and belt work, for each kind of
         outcome, and which key matters most.
@@ -250,12 +251,12 @@ def solve(
 
     Quantities are those of `chutelab quantities`, such as landing.x, x3, belt_work or
     ledger.by_surface.plate.restitution_loss. Of several particles say whose: particles[0].landing.x
-    is the first one's, landing.x.mean and arrival.vx.spread are the stream's. Belt work falls
-    steadily as particles land faster, and is negative above the belt's speed; what is least at that
-    speed is slip_heat.
+    is the first one's, landing.x.mean and arrival.vx.spread are the stream's. Belt work decreases
+    as particles land faster, and is negative above the belt's speed; the quantity that is least at
+    that speed is slip_heat.
 
     With one key all solutions in its range are found, and jumps are not taken for solutions. The
-    exit code is 1 if there is no solution; the nearest thing to one is shown then. It needs pip
+    exit code is 1 if there is no solution; the variant nearest to one is shown then. It needs pip
     install "chutelab[design]".
 
     A target and something to minimize together ask for the best of all solutions; --subject-to
@@ -266,18 +267,18 @@ def solve(
     chutelab solve stream --vary plate.angle_deg=0:40 --maximize arrival.vx.mean \
         --subject-to "arrival.share>=0.95" --jobs 0
 
-    Where particles meet, each variant is run with 8 seeds, the same for all, and the answer has
-    its standard error: no more digits are given than chance leaves. One solution is told then. With
+    Where particles meet, each variant is run with 8 seeds, the same for all, and the answer has its
+    standard error and no more digits than that error allows. Only one solution is given then. With
     --max-seconds, or Ctrl-C, the search ends with what is known.
 
     --vary KEY=FROM:TO  A key of the scene and the range to search, such as plate.angle_deg=0:80.
         May be repeated. [required]
-    --target QUANTITY=VALUE  What should be: VALUE is a number, with or without unit, a key of the
+    --target QUANTITY=VALUE The value wanted: VALUE is a number, with or without unit, a key of the
         scene or another quantity. May be repeated with as many --vary.
     --minimize QUANTITY  Make this as small as possible.
     --maximize QUANTITY  Make this as large as possible.
-    --subject-to LIMIT  QUANTITY>=VALUE or QUANTITY<=VALUE, such as "arrival.share>=0.95": what an
-        answer has to keep. May be repeated.
+    --subject-to LIMIT  QUANTITY>=VALUE or QUANTITY<=VALUE, such as "arrival.share>=0.95": a limit
+        that an answer has to keep. May be repeated.
     --repeat N  Run each variant with N seeds; default: 8 where particles meet, else 1.
     --deviations K  With several seeds: minimize the mean plus K standard deviations of one run, or
         maximize the mean less as many. [default]
@@ -355,7 +356,7 @@ def solve(
 
 
 STRESS = 0.01
-"""s; bins of lasting contacts where ``field`` is asked and the scene does not say."""
+"""s; bins of lasting contacts for ``field`` if the scene gives none."""
 
 COMPARED = ("compare.png", "points.csv", "fit.json")
 
@@ -396,7 +397,7 @@ def compare(
 
     The shipped track perpendicular-track is not a film: it was made from a simulation with
     restitution 0.62 and 1.9 m/s, seen at 120 frames a second with an error of 1 mm in each
-    coordinate. So it is known what a fit to it should find.
+    coordinate. So the result of a fit to it is known.
 
     --fit takes any number of the scene, which starts at the scene's value and stays within what the
     scene allows, and t0 (which is searched for everywhere), scale, origin.x and origin.y. What the
@@ -462,7 +463,7 @@ def compare(
 def discharge(
     scene: SceneName, *, heights: str = "", set_: Texts, out: Folder, json_: bool
 ) -> None:
-    """Lay the stream that leaves SCENE's pulley, as five methods have it, over the simulated one.
+    """Lay the stream that leaves SCENE's pulley, by five methods, over the simulated one.
 
     Of the scene only the incoming belt, its particles and its first stream are simulated: they fly
     freely. The table gives edges and centre of the stream at heights above the pulley's axis; the
@@ -517,15 +518,15 @@ def field(
     out: Folder,
     json_: bool,
 ) -> None:
-    """Run SCENE, and tell what its particles are as a continuum: fields on a grid.
+    """Run SCENE, and describe its particles as a continuum: fields on a grid.
 
     Coarse graining: each particle is spread by Lucy's kernel, which ends at its width, and means
-    are taken over a window of time. The table tells the least, mean and largest value of each
-    field; pictures show them on the machine. The fields: density, vx, vy, speed, temperature
-    (granular), pressure, sxx, sxy, syx, syy (stress; compression is negative). Stress is of the
-    fluctuations, of blows and, in the contact engine, of lasting contacts, kept in bins of
-    run.stress, 0.01 s if the scene says none. Other engines leave these out, and the table says how
-    much of all impulses they are.
+    are taken over a window of time. The table has the least, mean and largest value of each field;
+    pictures show them on the machine. The fields: density, vx, vy, speed, temperature (granular),
+    pressure, sxx, sxy, syx, syy (stress; compression is negative). Stress has the parts of
+    fluctuations, of impacts and, in the contact engine, of lasting contacts, which are recorded in
+    bins of run.stress (0.01 s if the scene gives none). Other engines leave these out, and the
+    table says what share of all impulses they are.
 
     chutelab field hopper --between 0.6,1 --of speed --of density --out out
     chutelab field stream --width 4cm --cell 5mm --vtk --out out

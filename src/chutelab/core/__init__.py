@@ -1,10 +1,10 @@
-"""What runs in Python and in the page alike, in C; in Python as WebAssembly, run by wasmtime.
+"""C code that Python and the page both run; in Python as WebAssembly, run by wasmtime.
 
 `*.c` are the machine of a scene and its releases, the contact engine, the exact engine, and the
-laws by which every run is judged; built by `python tools/build_core.py` to `core.wasm`, and what
-live pages call of it to `page.wasm`. `layout.h` says what they share with their host, and is a way
-in. Here is the core in memory: numbers in, numbers out, its arrays as NumPy's. Nothing else in the
-package knows that it is WebAssembly.
+laws by which every run is judged; `python tools/build_core.py` builds them to `core.wasm`, and the
+part that live pages call to `page.wasm`. `layout.h` defines the data shared with the host; begin
+reading there. Here the core is loaded: numbers in, numbers out, its arrays as NumPy's. Nothing else
+in the package knows that it is WebAssembly.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from numpy.typing import NDArray
 from chutelab.util.files import whole
 
 LARGE = 64 * 2**20
-"""Bytes beyond which a used memory is let go rather than kept for the next run."""
+"""A used memory larger than this, in bytes, is freed instead of kept for the next run."""
 
 SUBJECTS = ("Room", "World", "Plan", "Drawing", "Laws", "Exact", "Loads")
-"""Structs of layout.h of which the core has one each."""
+"""Structs of layout.h of which the core has exactly one."""
 
 TYPES = {"double": "<f8", "float": "<f4", "int": "<i4", "pointer": "<u4"}
 
@@ -65,7 +65,7 @@ def dtype(struct: str) -> np.dtype[Any]:
 
 @cache
 def _struct(name: str) -> type[ctypes.Structure]:
-    """Return a struct as a structure of ctypes, which is read and set ten times as fast."""
+    """Return a struct as a structure of ctypes, which is ten times as fast to read and set."""
     kinds = {"double": ctypes.c_double, "int": ctypes.c_int32, "pointer": ctypes.c_uint32}
     fields = _layout()["structs"][name]["fields"]
     rows = [
@@ -101,14 +101,14 @@ class Status(IntEnum):
 
 
 class AsideError(Exception):
-    """The core leaves it to the host to prepare this run, see `ASIDE` of layout.h."""
+    """The host has to prepare this run itself, see `ASIDE` of layout.h."""
 
 
 class Module:
     """One instance of the module, with a memory of its own.
 
-    Each subject of the core has one struct of numbers and of pointers to arrays, which a function
-    named like it gives; `world` is that of the contact engine. The core lays out its arrays itself;
+    Each part of the core has one struct of numbers and pointers to arrays, returned by a function
+    of its name; `world` is that of the contact engine. The core allocates its arrays itself;
     `forget` frees them all.
     """
 
@@ -118,7 +118,7 @@ class Module:
         try:
             self._exports: Any = wasmtime.Instance(self._store, module, []).exports(self._store)
         except wasmtime.WasmtimeError as error:
-            # Addresses for all that it may grow to are set apart, and there may be too few.
+            # Addresses for the largest possible memory are reserved, and there may be too few.
             raise MemoryError(" ".join(str(error).split())) from error
         self._functions: dict[str, Any] = {}
         self.call("_initialize")
@@ -134,7 +134,7 @@ class Module:
         """Call a function of the core."""
         if name not in self._functions:
             self._functions[name] = function = self._exports[name]
-            # It would ask for its own type in every call: half of what a call takes.
+            # Otherwise it would look up its type in every call, half of the time of a call.
             known = function.type(self._store)
             own = SimpleNamespace(params=known.params, results=known.results)
             function.type = lambda _: own
@@ -144,11 +144,11 @@ class Module:
         """Free all arrays and reset all structs."""
         for rows in self._own:
             rows.fill(0)
-        # The core takes what it has not come to for zeros: nothing of a run that never began.
+        # The core assumes zeros where it has not written yet, so nothing of an old run may remain.
         self._bytes[self._first : self._first + self._begun] = 0
 
     def work(self, name: str) -> None:
-        """Call a function that may take more memory; it makes all views of arrays invalid.
+        """Call a function that may allocate memory, after which all views of arrays are invalid.
 
         Raises a `MemoryError` if there is no more to be had.
         """
@@ -158,7 +158,7 @@ class Module:
             raise MemoryError(f"the core has {self.size / 2**30:.1f} GiB, and gets no more")
 
     def _look(self) -> None:
-        """Look at the memory anew; it moves when it grows, and with it every array."""
+        """Get the memory again: it moves when it grows, and with it every array."""
         size = self._memory.data_len(self._store)
         if size == self.size:
             return
@@ -184,12 +184,12 @@ class Module:
         return self._bytes.copy()
 
     def restore(self, kept: NDArray[Any]) -> None:
-        """Have its memory be as it was; what it has grown by since is empty."""
+        """Restore its memory; bytes added since are 0."""
         self._bytes[: len(kept)] = kept
         self._bytes[len(kept) :] = 0
 
     def array(self, name: str, kind: np.dtype[Any], count: int, of: str = "World") -> NDArray[Any]:
-        """Return a view of the array that a field points to, good until `work` or `run`."""
+        """Return a view of the array that a field points to, valid until `work` or `run`."""
         begin: int = getattr(self.structs[of], name)
         rows: NDArray[Any] = self._bytes[begin : begin + kind.itemsize * count].view(kind)
         return rows
@@ -197,7 +197,7 @@ class Module:
     def take_events(self, of: str = "World") -> NDArray[Any]:
         """Return all events as the bytes of rows of `results.EVENT`, and make room for others.
 
-        Those of a run that is over stay where they are: as `array`, good until the next call.
+        Those of a finished run are not copied: like `array`, valid until the next call.
         """
         struct, room = self.structs[of], self.structs["Room"]
         size: int = room.packed or self.call("pack_events", struct.events, struct.event_count)
@@ -211,7 +211,7 @@ class Module:
             self.array(name, np.dtype(np.uint8), array.nbytes, of)[:] = array.view(np.uint8)
 
     def begin_with(self, numbers: NDArray[Any]) -> bool:
-        """Copy numbers to where the first array will lie; return whether there is room for them."""
+        """Copy numbers to the place of the first array; return whether there is room for them."""
         rows = self._bytes[self._first : self._first + numbers.nbytes]
         if fits := len(rows) == numbers.nbytes:
             self._begun = numbers.nbytes
@@ -219,8 +219,8 @@ class Module:
         return fits
 
     def run(self, name: str, steps: int, lacking: int) -> int:
-        """Call a function for so many steps at most, as `work`; `lacking` tells of no memory."""
-        # A number that is handed over takes as long as the rest of a call.
+        """Call a function for at most so many steps, as `work`; `lacking` means out of memory."""
+        # Passing a number takes as long as the rest of a call.
         self.structs["Room"].budget = steps
         status: int = self.call(name)
         self._look()
@@ -233,7 +233,7 @@ class Module:
 
 @cache
 def _compiled() -> tuple[wasmtime.Engine, wasmtime.Module]:
-    """Return the module, compiled: that takes 60 ms, to load what the last time kept 1 ms."""
+    """Return the compiled module: compiling takes 60 ms, loading it from the cache 1 ms."""
     engine, source = wasmtime.Engine(), (files(__package__) / "core.wasm").read_bytes()
     # Kept for this version of wasmtime in the user's cache folder.
     folder = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
@@ -242,8 +242,8 @@ def _compiled() -> tuple[wasmtime.Engine, wasmtime.Module]:
     kept = home / "chutelab" / f"{name}.core"
     with suppress(OSError, wasmtime.WasmtimeError):
         data, states = kept.read_bytes(), [kept.stat(), kept.parent.stat()]
-        # What is loaded is run as it is: nothing damaged, nothing that another user can write. On
-        # Windows its place says so.
+        # The file is loaded as machine code, so it must be undamaged and writable by this user
+        # only. On Windows its folder ensures that.
         own = os.name == "nt" or all(
             one.st_uid == os.geteuid() and not one.st_mode & 0o022 for one in states
         )

@@ -27,13 +27,13 @@ from chutelab.util.arrays import Floats, Ints, Progress, unwatched
 UNTIL = {name.removeprefix("UNTIL_").lower(): one for name, one in constants("Until").items()}
 
 GREATEST = 1e300
-"""Friction without a bound, as a number that can be multiplied by zero."""
+"""Stands for unbounded friction; finite, so that it can be multiplied by zero."""
 
 SLICE = 0.05
-"""s of wall time between two looks at Ctrl-C and reports of progress."""
+"""s of wall time between two checks for Ctrl-C, and reports of progress."""
 
 MOST_STEPS = 512
-"""Steps between two looks, at most: later ones may take a thousand times as long."""
+"""Most steps between two checks: later ones may take a thousand times as long."""
 
 
 def run(machine: Machine, progress: Progress | None = None) -> Record:
@@ -44,12 +44,12 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     machine : Machine
         From `chutelab.machine.build`; the radius must be more than 0.
     progress : callable, optional
-        Called now and then with the share of the run that is done; may end the run.
+        Called now and then with the share of the run that is done; it may end the run.
 
     Returns
     -------
     Record
-        Flights and blows to rounding error, lasting contacts of second order in `machine.dt`;
+        Flights and impacts are exact to rounding, lasting contacts of second order in `machine.dt`;
         bit-identical on every machine.
 
     Raises
@@ -57,7 +57,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     ValueError
         If the particle has no radius.
     StalledError
-        If a particle does not get on; it has the recording so far.
+        If a particle gets stuck; it has the recording so far.
     """
     if machine.scene.cornered:
         machine.finish()
@@ -73,7 +73,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         take(module, record)
         return recorder.whole(record, stalled)
     except AsideError:
-        # What is wrong with a machine is told below, without this around it.
+        # Errors of the machine are raised below, without this one as context.
         pass
     finally:
         give_back(module)
@@ -82,7 +82,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
 
 
 def together(machine: Machine) -> Machine:
-    """Return a machine that runs all its particles at a time: those that never meet pass by."""
+    """Return a machine whose particles all run at once, even if they do not interact."""
     if machine.interact:
         return machine
     passing = np.full_like(machine.pair_restitution, PASSES)
@@ -96,7 +96,7 @@ def parts(machine: Machine) -> dict[str, Pieces]:
 
 
 def pieces(machine: Machine) -> NDArray[Any]:
-    """Return all surfaces as rows of the core, as far as it asks."""
+    """Return all surfaces as rows of the core, with the fields that it needs."""
     every = parts(machine)
     rows = np.zeros(sum(part.surface.size for part in every.values()), dtype("Surface"))
     first = 0
@@ -112,13 +112,13 @@ def pieces(machine: Machine) -> NDArray[Any]:
 
 
 class Job:
-    """One run: fills the module's memory, and drains what it writes."""
+    """One run: fills the module's memory, and copies the results from it."""
 
     def __init__(self, module: Module, machine: Machine, *, whole: bool = True) -> None:
         self.module, self.machine = module, machine
         self.knots: list[tuple[Ints, NDArray[Any], Floats]] = []
         self.events: list[NDArray[Any]] = []
-        # First disk of the part in which the run was stopped: from it on disks have not ended.
+        # First disk of the part in which the run was stopped; later ones have not ended.
         self.stopped_from, self.owners = machine.count, len(machine.surfaces)
         for name, value in (
             ("interact", machine.interact), ("is_whole", whole), ("until", UNTIL[machine.until]),
@@ -200,7 +200,7 @@ class Job:
         module.work("prepare_to_judge")
 
     def run(self, progress: Progress | None) -> StalledError | None:
-        """Run to the end, or until a particle stalls: return which one."""
+        """Run to the end, or until a particle gets stuck, which is returned."""
         steps, status = 64, Status.PAUSED
         with suppress(EnoughError):
             while status not in (Status.DONE, Status.STALLED):
@@ -218,7 +218,7 @@ class Job:
         return self.stalled()
 
     def stalled(self) -> StalledError:
-        """Return where the run has stalled, and why."""
+        """Return where the run got stuck, and why."""
         world = self.module.world
         disk = self.module.array("disks", dtype("Disk"), self.machine.count)[world.stalled]
         reason = (
@@ -245,7 +245,7 @@ class Job:
         return status
 
     def proceed(self, steps: int) -> Status:
-        """Run on for at most so many steps, and take what was written."""
+        """Run on for at most so many steps, and copy what was written."""
         module = self.module
         status = Status(module.run(self.begin, steps, Status.LACKING))
         self.begin = "run_and_judge"
@@ -255,7 +255,7 @@ class Job:
         return status
 
     def drain(self) -> None:
-        """Take what was written, so that there is room for more."""
+        """Copy what was written, so that there is room for more."""
         world, module = self.module.world, self.module
         if world.knot_count:
             rows = module.array("knots", dtype("Knot"), world.knot_count)
@@ -270,17 +270,17 @@ class Job:
         end, ended = world.end_time, world.done / n
         if self.machine.interact:
             return float(min(1.0, max(ended, world.t / end if end > 0.0 else 1.0)))
-        # One after the other, each from its release on.
+        # The particles run one after the other, each from its release on.
         disks = self.module.array("disks", dtype("Disk"), n)
         begin = float(disks["release"][world.low]) if world.low < n else end
         passed = (world.t - begin) / (end - begin) if begin < world.t < end else 0.0
         return float(min(1.0, ended + passed / n))
 
     def write(self, recorder: Recorder) -> None:
-        """Write down what was recorded."""
+        """Write the recording."""
         self.drain()
         world, module = self.module.world, self.module
-        # Each chunk is freed when it is handed over: together they are most of the memory.
+        # Each chunk is freed after copying, as together they take most of the memory.
         self.knots.reverse()
         self.events.reverse()
         while self.knots:

@@ -1,7 +1,7 @@
 """The event-driven engine: particles move on exact arcs, the next event is solved, not stepped.
 
-It is in C, in `chutelab.core` (exact.c and its files), and shares nothing with the contact
-engine's; here `run` goes from a machine to a recording. There is no contact between particles.
+It is in C, in `chutelab.core` (exact*.c), and shares nothing with the contact engine; here `run`
+goes from a machine to a recording. There is no contact between particles.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ ROUNDS = 500_000
 200,000; one that rattles at 7 ms a period for the default max_time needs 10,000."""
 
 WINDOW = 10_000
-"""Events between two looks at whether a particle makes progress."""
+"""Events between two checks whether a particle makes progress."""
 
 TICK = 1e-12
-"""s over `Machine.pace`; mean time between events below which it does not: the last bounces before
-rest, at 1e-9 m/s, are 200 times as far apart."""
+"""s, divided by `Machine.pace`: if the mean time between events is shorter, a particle makes no
+progress. The last bounces before rest, at 1e-9 m/s, are 200 times as long."""
 
 SLICE = 0.02
-"""s of wall time between two looks at Ctrl-C and reports of progress."""
+"""s of wall time between two checks for Ctrl-C, and reports of progress."""
 
 FIRST, MOST = 16, 100_000
-"""Events up to the first look, as most lone runs have fewer, and between two looks."""
+"""Events up to the first check, as most runs of one particle have fewer, and between two checks."""
 
 COURSE = constants("Course")
 
@@ -46,7 +46,7 @@ UNTIL = {name.removeprefix("UNTIL_").lower(): one for name, one in constants("Un
 
 
 class CornerError(RuntimeError):
-    """A spinning disk held between moving surfaces: beyond the exact engine."""
+    """A spinning disk is held between moving surfaces, which the exact engine cannot run."""
 
 
 def run(machine: Machine, progress: Progress | None = None, *, apart: bool = False) -> Record:
@@ -58,8 +58,7 @@ def run(machine: Machine, progress: Progress | None = None, *, apart: bool = Fal
 
     Raises a `ValueError` if the particles interact, or some but not all are points; a `CornerError`
     if a spinning disk is held between surfaces of which one moves; a `StalledError` if a particle
-    has event after event without progress: its track ends there, and the recording has those of all
-    others.
+    has events without progress: its track ends there, and the recording has all others.
     """
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")
@@ -84,7 +83,7 @@ def run(machine: Machine, progress: Progress | None = None, *, apart: bool = Fal
         take(module, record)
         return recorder.whole(record, stalled)
     except AsideError:
-        # What is wrong with a machine is told below, without this around it.
+        # Errors of the machine are raised below, without this one as context.
         pass
     finally:
         give_back(module)
@@ -93,18 +92,18 @@ def run(machine: Machine, progress: Progress | None = None, *, apart: bool = Fal
 
 
 def ask(module: Module, machine: Machine, far: float, apart: bool) -> None:
-    """Tell the core how to run, on coordinates that were rounded `far` off (m)."""
+    """Set the core's run parameters; coordinates were rounded at the distance `far` (m)."""
     exact: Any = module.structs["Exact"]
     exact.apart, exact.until = apart, UNTIL[machine.until]
     exact.landing, exact.far, exact.loose = machine.landing, far, machine.loose
-    # The core judges in its own frame.
+    # The core judges the run in its own frame.
     exact.is_whole = far == 0.0 and machine.tilt == 0.0
     exact.most, exact.window, exact.tick = ROUNDS, WINDOW, TICK
     module.structs["Loads"].every = machine.loads
 
 
 def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
-    """Hand a machine over to the core, whose coordinates were rounded `far` off (m)."""
+    """Hand a machine over to the core; its coordinates were rounded at the distance `far` (m)."""
     count, segments, arcs = machine.count, machine.segments, machine.arcs
     family, wheel = machine.family, machine.pulley
     each = 0 if family is None else family.each
@@ -126,7 +125,7 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
         return found.reshape(shape)
 
     def shared(numbers: Any) -> Any:
-        """Return what particles of a scene have alike: of a family once for each scene."""
+        """Return the values that all particles of a scene share; for a family one row per scene."""
         return numbers[::each] if each > 1 and np.ndim(numbers) else numbers
 
     materials = rows("materials", "Pair", kinds, columns)
@@ -168,7 +167,7 @@ def follow(
 ) -> StalledError | None:
     """Run to the end; return which particle first made no progress.
 
-    The core goes on from `begin`: it builds the machine, or has it.
+    The core continues from `begin`: it builds the machine, or has it already.
     """
     stalled, course, events = None, COURSE["PAUSING"], FIRST
     with suppress(EnoughError):
@@ -199,7 +198,7 @@ def follow(
 
 
 def stuck(course: int, passed: float) -> str:
-    """Return why a particle makes no progress, whose latest events took some time (s), or ""."""
+    """Return why a particle makes no progress, "" if it does; its latest events took `time` s."""
     if course == COURSE["NO_PROGRESS"]:
         return (
             f"{number('MOST_IDLE')} events in a row took no time; look for surfaces that nearly"
@@ -217,7 +216,7 @@ def stuck(course: int, passed: float) -> str:
 
 
 def drain(module: Module, recorder: Recorder) -> None:
-    """Take what was written, so that there is room for more."""
+    """Copy what was written, so that there is room for more."""
     exact: Any = module.structs["Exact"]
     if exact.knot_count:
         rows = module.array("knots", dtype("Knot"), exact.knot_count, of="Exact")
@@ -228,11 +227,11 @@ def drain(module: Module, recorder: Recorder) -> None:
 
 
 def collect(module: Module, recorder: Recorder) -> None:
-    """Take what is still there, reasons and books."""
+    """Copy the rest: reasons, and ledger entries by surface."""
     drain(module, recorder)
     exact: Any = module.structs["Exact"]
     lones = module.array("lones", dtype("Lone"), exact.lone_count, of="Exact")
-    # Those from `lone` on were stopped.
+    # Particles from `lone` on were stopped.
     recorder.ended[: exact.lone] = lones["reason"][: exact.lone]
     books = module.array("books", REAL, recorder.by_surface.size, of="Exact")
     recorder.by_surface = books.copy().reshape(recorder.by_surface.shape)

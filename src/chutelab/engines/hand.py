@@ -1,7 +1,7 @@
-"""A run by hand: step by step, with pushes, plates that are turned, and speeds that are changed.
+"""A run by hand: stepped, with pushes, plates that are turned, and speeds that are changed.
 
-`start` begins one, on the contact engine, whose core steps anyway: what is only stepped is bit for
-bit what `chutelab.simulate` gives.
+`start` begins one on the contact engine. A run that is only stepped is bit for bit that of
+`chutelab.simulate`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from chutelab.util.errors import InputError
 from chutelab.util.tables import many, number
 
 SET = "plate.angle_deg, the speed of a belt, or the speed_deg and torque of a motor"
-"""What can be set while a run goes on."""
+"""Keys that can be set during a run."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +38,12 @@ class Touch:
     other: int  # the other particle, -1 if it is a surface
     surface: str  # its name, "" if it is a particle
     normal: tuple[float, float]  # unit vector towards the particle
-    pressed: float  # N; by which it is pressed off along the normal
-    rubbed: float  # N; friction on it along (n_y, -n_x)
+    pressed: float  # normal force on the particle, N
+    rubbed: float  # friction on the particle along (n_y, -n_x), N
 
 
 def start(scene: AnyScene, changes: Overrides = ()) -> Run:
-    """Begin a run that goes on step by step.
+    """Begin a run that is stepped by hand.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def start(scene: AnyScene, changes: Overrides = ()) -> Run:
     Returns
     -------
     Run
-        On the contact engine, whatever the scene asks for; all particles go on together.
+        On the contact engine, whatever the scene asks for; all particles run together.
 
     Raises
     ------
@@ -78,10 +78,10 @@ class Run:
     Attributes
     ----------
     t : float
-        How far it is, s. The engine's steps are its own, so that the same scene has the same bits:
-        a `step` ends with the first of them that ends no earlier than it is to.
+        Time reached, s. The engine chooses its own steps, so that the same scene has the same bits:
+        a `step` ends with the first of them that ends no earlier than asked.
     done : bool
-        Whether the run has ended, as ``run.until`` says: it goes on no further.
+        Whether the run has ended by ``run.until``; it does not go on.
     """
 
     def __init__(self, scene: Any) -> None:
@@ -132,7 +132,7 @@ class Run:
             x, y = np.array(self._machine.steered(surface).pivot) - self._origin
             if not self.done and not module.call("steer", surface, x, y, angle, self._due):
                 raise MemoryError("the core gets no more memory")
-        # Rounding of a sum of steps is no step; where a plate stops, one ends.
+        # A remainder by rounding is no step. A step ends where a plate stops.
         module.world.pause = self._due if self._angles else self._due * (1.0 - 1e-12)
         self._angles.clear()
         while not self.done and module.world.t < module.world.pause:
@@ -149,9 +149,9 @@ class Run:
     ) -> None:
         """Push with a force (x, y), N, during the next `step`.
 
-        A particle, by its number, at its centre: what the incoming belt carries by adhesion is not
-        moved, nor what is not under way. Or what hangs on a hinge, by its name, at a place `at`, m:
-        the force turns with it, so that its torque stays.
+        Either a particle, by its number, at its centre; particles that the incoming belt carries by
+        adhesion, or that are not under way, are not moved. Or a hinged surface, by its name, at a
+        place `at`, m; the force turns with it, so that its torque is constant.
         """
         if np.shape(force) != (2,) or not all(map(isfinite, force)):
             raise InputError("two finite numbers, N", "force", force)
@@ -176,15 +176,15 @@ class Run:
         self._pushed.add(body)
 
     def set(self, key: str, value: Any) -> None:
-        """Change a key of the scene from here on.
+        """Change a key of the scene from now on.
 
-        The angle of a plate, to which it turns at an even rate during the next `step`, as a drive
-        would turn it; the speed of a belt; speed and torque of a motor.
+        The angle of a plate, to which it turns at a constant rate during the next `step`, as a
+        drive would turn it; the speed of a belt; speed and torque of a motor.
 
         Raises
         ------
         SceneError
-            If the key cannot have that value, or cannot be set while a run goes on.
+            If the key cannot have that value, or cannot be set during a run.
         """
         old, new = self.scene, load(self.scene, {key: value})
         module, last, first = self._module, key.split(".")[-1], self._machine.scene.plates
@@ -213,15 +213,15 @@ class Run:
 
     @property
     def positions(self) -> Floats:
-        """Where the centres are, (N, 2), m; NaN of what is not under way."""
+        """Positions of the centres, (N, 2), m; NaN if not under way."""
         x, y, _, _ = self._moved()
         return np.asarray(np.stack([x, y], axis=-1) + self._origin)
 
     @property
     def velocities(self) -> Floats:
-        """How fast the centres are, (N, 2), m/s; NaN of what is not under way.
+        """Velocities of the centres, (N, 2), m/s; NaN if not under way.
 
-        Of what lies on something it is that of the middle of the engine's last step.
+        In lasting contact it is the velocity in the middle of the engine's last step.
         """
         _, _, vx, vy = self._moved()
         return np.stack([vx, vy], axis=-1)
@@ -234,7 +234,7 @@ class Run:
         found = []
         for n, name in enumerate("xy"):
             pull, v = (world.gx, world.gy)[n], disks[f"v{name}"]
-            # Of a push the second half of the last step is still to come.
+            # The second half of a push's impulse in the last step is still to come.
             late = 0.5 * world.length * light * disks["pushed"][:, n]
             found.append(np.where(on, disks[name] + (v + 0.5 * pull * h) * h, np.nan))
             found.append(np.where(on, v + pull * fell + late, np.nan))
@@ -248,7 +248,7 @@ class Run:
 
     @property
     def contacts(self) -> list[Touch]:
-        """What touched what in the latest step, with which forces; not what is asleep."""
+        """Lasting contacts of the latest step with their forces, but not of sleeping particles."""
         module, names = self._module, self._machine.surfaces
         world, found = module.world, list[Touch]()
         rows = module.array("earlier", dtype("Contact"), world.earlier_count)
@@ -265,13 +265,13 @@ class Run:
         return found
 
     def pose(self, surface: str) -> Floats:
-        """Return where a surface is that moves: x, y of its pivot, m, and its angle, rad, (3,)."""
+        """Return the pose of a moving surface: x, y of its pivot, m, and its angle, rad, (3,)."""
         pose: Floats = self.recording.pose(surface, self.t)[0]
         return pose
 
     @property
     def recording(self) -> Recording:
-        """The run so far; what has not ended has the reason ``"stopped"``."""
+        """The run so far; tracks that have not ended have the reason ``"stopped"``."""
         module, job, kept = self._module, copy(self._job), self._module.snapshot()
         job.knots, job.events = [*job.knots], [*job.events]
         recorder = Recorder(self._machine)

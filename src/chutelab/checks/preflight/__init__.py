@@ -1,7 +1,7 @@
-"""The look at a scene before it runs: what will happen, what it will cost, what to mind.
+"""``check``: what will happen in a run, what it will cost, and what to watch out for.
 
-`preflight` is all of it. Each warning comes with what would change it: settings for the machine are
-tried before they are recommended.
+`preflight` is all of it. Each warning says what would change it; settings for the machine are tried
+before they are recommended.
 
 - `trial`: `Preflight` and its parts: what will be built, what the closed form answers, what a run
   costs, estimated from one that is cut off after 1 s.
@@ -55,7 +55,7 @@ EXIT = REASONS.index("exit")
 
 LEAVE = "if it is meant, leave it; the first contact wins"
 LOOK = "look at the picture (--out DIR --only png) for what turns it away"
-"""Advice where no setting is known to help: of surfaces that cross, and of others."""
+"""Advice if no setting is known to help: for surfaces that cross, and for other warnings."""
 
 SMALL = 0.002
 """m; a smaller radius is beyond what pymunk resolves in SI units."""
@@ -64,13 +64,13 @@ MARGIN = 0.01
 """Margin of a recommended setting, m; of a rate as a share."""
 
 MOST_CAUTIONS = 20
-"""Surfaces that cross, or miss, that are told one by one; for each some settings are tried."""
+"""Most warnings about surfaces that cross or miss; for each some settings are tried."""
 
 ON_RUBBER = 0.5
 """Coefficient of friction of bulk material on a belt: 0.5 to 0.7 by ISO 5048."""
 
 SOME = 16
-"""Particles that are followed to where they miss the belt, at most."""
+"""Most particles that are followed to the place where they miss the belt."""
 
 LANDING_ROOM = 0.5
 """m of belt to spare before and behind a landing."""
@@ -97,14 +97,14 @@ def _densities(scene: Scene) -> Iterator[Advice]:
 
 
 GRAINS: Final = 3.0
-"""Diameters of the largest grain: through a narrower gap a stream may jam."""
+"""In diameters of the largest grain: a stream may jam in a narrower gap."""
 
 CELLS: Final = 64
-"""Cells along each side of a box whose parts are looked for."""
+"""Cells along each side of a `fill` box that is searched for walls."""
 
 
 def places(scene: Scene, machine: Machine) -> Iterator[Advice]:
-    """Yield what may surprise about a machine and where its particles start."""
+    """Yield warnings about a machine and the places where its particles start."""
     for belt in scene.conveyor:
         # Between its carrying and its returning side.
         way = np.subtract(belt.to, belt.from_)
@@ -139,7 +139,7 @@ def _narrow(scene: Scene, machine: Machine) -> Iterator[Advice]:
             if not 0.0 < gap < GRAINS * largest or belt.away(end)[1] <= 0.0:
                 continue
             path = f"{scene.head('plate', number)}.below"
-            # Its end is higher by what is missing, rounded to 1 mm.
+            # Raise its end by what is missing, rounded to 1 mm.
             (length,) = lines.length[lines.surface == machine.surfaces.index(name)]
             shorter = (GRAINS * largest - gap) / cos(radians(plate.angle_deg))
             settings = {path: float(np.floor(1e3 * (length - plate.above - shorter)) / 1e3)}
@@ -157,9 +157,9 @@ def _narrow(scene: Scene, machine: Machine) -> Iterator[Advice]:
 
 
 def _beyond_walls(scene: Scene, machine: Machine) -> Iterator[Advice]:
-    """Warn of a `fill` that walls cut into parts: what starts in the smaller ones is outside."""
+    """Warn of a `fill` that walls cut into parts: particles in the smaller parts start outside."""
     starts = machine.releases
-    # What is there at t = 0 as straight pieces: ends (P, 2, 2), m, and surfaces (P,).
+    # The surfaces at t = 0 as straight pieces: ends (P, 2, 2), m, and surface indices (P,).
     ends, owner = np.empty((0, 2, 2)), np.empty(0, dtype=np.int64)
     for part in machine.parts:
         for piece in map(part.of, np.flatnonzero(part.there(0.0))):
@@ -197,7 +197,7 @@ Side = tuple[tuple[int, int], tuple[int, int]]
 
 
 def _parts(low: Floats, high: Floats, walls: Floats) -> tuple[Ints, list[tuple[Side, int]]]:
-    """Return into which parts walls cut a box: a number for each cell (row, column).
+    """Return the part of a box, cut by walls, that each cell (row, column) belongs to.
 
     Cells beside each other are in one part unless a wall runs between their middles. Also those
     pairs of cells, and which wall.
@@ -220,7 +220,7 @@ def _parts(low: Floats, high: Floats, walls: Floats) -> tuple[Ints, list[tuple[S
         for line, k, which in zip(*found, strict=True):
             pair = ((line, k), (line, k + 1)) if axis == 0 else ((k, line), (k + 1, line))
             blocked.append((pair, which))
-    # Numbers of cells, the same for those that open sides connect.
+    # Numbers of cells; connected cells have the same number.
     across, up = open_[0], open_[1].T
     label = np.arange(CELLS * CELLS).reshape(CELLS, CELLS)
     while True:
@@ -237,7 +237,7 @@ def _parts(low: Floats, high: Floats, walls: Floats) -> tuple[Ints, list[tuple[S
 def advice(
     scene: Scene, machine: Machine, tried: Trial, steps: Stepping | None, cost: Effort
 ) -> Iterator[Advice]:
-    """Yield what may surprise about a scene that works; `steps` is None for the exact engine."""
+    """Yield warnings about a scene that works; `steps` is None for the exact engine."""
     for caution in machine.warnings[:MOST_CAUTIONS]:
         mended: Settings = {}
         for settings in _candidates(scene, machine, caution):
@@ -265,7 +265,7 @@ def advice(
             yield _advised(warning, {"particle.radius": SMALL})
         else:
             yield _advised(warning, {"run.engine": "auto"}, after=", for the exact engine")
-    # Where particles may pass through a surface, where they end is not worth a warning.
+    # If particles may pass through a surface, their ends need no further warning.
     if tried.recording is not None and (steps is None or steps.safe):
         yield from _ending(scene, machine, tried.recording)
     if tried.trouble:
@@ -301,7 +301,7 @@ def advice(
     radius = np.broadcast_to(machine.particle.radius, machine.count)[rides]
     pressed = squeeze(scene, start.t[rides], start.position[rides], radius)
     if pressed is not None and scene.incoming is not None:
-        # Not another speed: that would be another machine.
+        # Do not recommend another speed: that would be another machine.
         yield _advised(
             f"of {machine.count} particles, {pressed}",
             {"incoming.friction": ON_RUBBER},
@@ -319,7 +319,7 @@ def advice(
 def _advised(
     warning: str, settings: Settings | None = None, *, after: str = "", otherwise: str = LOOK
 ) -> Advice:
-    """Put settings in words, and what to know of them after; or say what to do without any."""
+    """Describe settings in words, with remarks; or say what to do if there are none."""
     written = [
         f"{key} = {f'{value:.6g}' if isinstance(value, float) else shown(value)}"
         for key, value in (settings or {}).items()
@@ -328,7 +328,7 @@ def _advised(
 
 
 def _candidates(scene: Scene, machine: Machine, caution: Caution) -> Iterator[Settings]:
-    """Yield settings that might do away with a warning of the machine, the mildest first."""
+    """Yield settings that might remove a warning about the machine, the smallest change first."""
     plate, out, pulley, r = (
         scene.plate,
         scene.outgoing,
@@ -391,7 +391,7 @@ def _belt_height(machine: Machine) -> float:
 
 
 def _ending(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice]:
-    """Yield what is odd about how the trial's particles end."""
+    """Yield warnings about the ends of the trial's particles."""
     ended = [REASONS[reason] for reason in tried.ended.tolist()]
     gone, late = ended.count("exit"), ended.count("time") + ended.count("unreleased")
     lone = len(ended) == 1

@@ -1,4 +1,4 @@
-"""What a look at a scene finds: what is built and skipped, and the cost.
+"""What `preflight` finds: what is built and skipped, and the cost.
 
 The cost is estimated from a trial run, which is cut off after 1 s.
 """
@@ -44,11 +44,11 @@ class Stepping:
     """What finite steps mean for a scene."""
 
     dt: float  # longest step, s
-    aligned: bool  # blows are met at their own instants: nothing is passed through at any speed
+    aligned: bool  # impacts are found at their own times, so nothing is passed through at any speed
     speed: float | None  # highest in the trial run, m/s; None if there was none
-    way: float | None  # of a particle in a step at that speed, m
-    bound: float  # what it must stay below if steps are not aligned: the radius, m
-    longest: float | None  # step with which it would, s
+    way: float | None  # distance that a particle covers in a step at that speed, m
+    bound: float  # upper bound of it if steps are not aligned: the radius, m
+    longest: float | None  # step with which it stays below, s
     safe: bool  # no particle can pass through a surface unseen
 
     def rows(self) -> list[tuple[str, str]]:
@@ -72,7 +72,7 @@ class Stepping:
 
 @dataclass(frozen=True)
 class Extra:
-    """What it costs to count something in a run, or to read it off one."""
+    """Cost of recording something in a run, or of computing it from one."""
 
     name: str  # "loads", "sensors" or "wear"
     seconds: float  # more of processor time for the whole run, about
@@ -91,19 +91,19 @@ class Effort:
 
     contacts: int  # impacts and collisions, about
     seconds: float  # processor time of a run here and now, about
-    at_least: bool  # how much cannot be told: all are lower bounds
+    at_least: bool  # the amount is unknown: all numbers are lower bounds
     how: str  # what the estimate rests on
     memory: int  # bytes that a run needs at its peak, about
-    extras: tuple[Extra, ...] = ()  # what is measured only if it is asked for
+    extras: tuple[Extra, ...] = ()  # cost of quantities that are measured only on request
 
 
 @dataclass(frozen=True)
 class Advice:
-    """Something that works but may surprise, and what would change it."""
+    """A warning about something that works, and what would change it."""
 
     warning: str
     change: str  # what to do, in words
-    settings: Mapping[str, Any]  # the same for `Scene.with_values`; empty if none is known to help
+    settings: Mapping[str, Any]  # as settings for `Scene.with_values`; empty if none is known
 
 
 @dataclass(frozen=True, repr=False)
@@ -129,7 +129,7 @@ class Preflight(Shown):
         if self.stepping is not None:
             rows += self.stepping.rows()
         about = "not known, at least" if self.effort.at_least else "about"
-        # Two digits of contacts and memory and one of the time are known.
+        # Contacts and memory are known to two digits, the time to one.
         contacts = int(float(f"{self.effort.contacts:.2g}"))
         lasts = write_size(float(f"{self.effort.seconds:.1g}"), "s", digits=6)
         rows.append(("contacts", f"{about} {contacts:,}"))
@@ -151,7 +151,7 @@ class Preflight(Shown):
 
 
 MANY = 12
-"""Pieces of one surface that are listed; of more only how many they are."""
+"""Pieces of one surface that are listed; if there are more, only their number is given."""
 
 
 def built(machine: Machine) -> Iterator[Part]:
@@ -216,7 +216,7 @@ def _span(values: Floats, name: str, unit: str) -> str:
 def skipped(
     scene: Scene, machine: Machine, engine: str, recording: Recording | None
 ) -> Iterator[Part]:
-    """Yield the parts that the scene has not, and why; `recording` is a trial run of it."""
+    """Yield the parts that are not built, and why; `recording` is a trial run of the scene."""
     for table in ("incoming", "plate", "outgoing", "surface"):
         if not getattr(scene, table):
             written = f"[[{table}]]" if table == "surface" else f"[{table}]"
@@ -245,29 +245,29 @@ PATIENCE = 1.0
 five are over by then."""
 
 LONE_PATIENCE = 0.1
-"""The same for particle 0 by itself."""
+"""The same for a run of particle 0 alone."""
 
 BIN, BRIEF, TURNS = 0.01, 0.06, 3
-"""s; bins in which loads are counted to see what that costs, for how long, and how many times."""
+"""To measure the cost of loads: width of the bins (s), length of the run (s), and repeats."""
 
 MOST = 5000
-"""Particles that an engine with steps is tried with, at most: it sets up memory for each."""
+"""Most particles in a trial of a stepped engine, which sets up memory for each."""
 
 WARMING = 0.05
-"""s; a trial shorter than this is run once more, because its first time is mostly warming up."""
+"""s; a shorter trial is run a second time, since its first run is mostly warming up."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A run up to its end, or until patience was over."""
+    """A run up to its end, or up to the time limit."""
 
     recording: Recording | None  # None if it never came to one
     seconds: float  # of processor time; once warm, if it came to its end
     marks: Floats = field(default_factory=lambda: np.zeros((0, 2)))  # s, and share of the run done
-    warming: float = 0.0  # s that its first time took longer
-    # Particle 0 by itself, not stepped where that can be had; None where the trial was not, either.
+    warming: float = 0.0  # s by which the first run took longer
+    # Run of particle 0 alone, without steps if possible; None if the trial was not stepped, either.
     lone: Recording | None = None
-    trouble: str = ""  # what stopped it, if the engine did not get on
+    trouble: str = ""  # the error that ended it, if the engine got stuck
 
     @property
     def whole(self) -> bool:
@@ -320,7 +320,7 @@ def extras(machine: Machine, tried: Trial, cost: Effort) -> Iterator[Extra]:
         marks = [
             np.vstack([(0.0, 0.0), one.marks, *[(one.seconds, 1.0)] * one.whole]) for one in runs
         ]
-        # How long each took to where the one that got less far is.
+        # Time that each took up to the point that the slower one reached.
         share = min(one[-1, 1] for one in marks)
         begin, end = (float(np.interp(share, one[:, 1], one[:, 0])) for one in marks)
         if begin > 0.0:
@@ -373,11 +373,11 @@ def _timed(machine: Machine, patience: float) -> Trial:
 
 
 def stepping(machine: Machine, engine: str, tried: Trial) -> Stepping:
-    """Compare how far particles go in a step with how far they may for surfaces to stop them.
+    """Compare the distance per step with the largest at which surfaces stop particles.
 
-    The contact engine finds every blow at its own instant, as the pymunk engine does for a lone
-    particle with aligned steps. Otherwise a contact is seen at the end of a step, and must be
-    before the centre is on the other side: surfaces have no thickness.
+    The contact engine finds every impact at its own time, as the pymunk engine does for a lone
+    particle with aligned steps. Otherwise a contact is detected at the end of a step, and that must
+    be before the centre is on the other side, since surfaces have no thickness.
     """
     bound = float(np.min(machine.particle.radius))
     runs = (run for run in (tried.lone, tried.recording) if run is not None and len(run.knots))
@@ -400,10 +400,10 @@ def stepping(machine: Machine, engine: str, tried: Trial) -> Stepping:
 
 
 FEWEST = 0.1
-"""Share of a run below which a trial says no more than how long it takes at least."""
+"""If a trial covers a smaller share of the run, its time is only a lower bound."""
 
 SPREAD = 3.0
-"""Ratio of two estimates beyond which neither is told."""
+"""If two estimates differ by a larger factor, neither is reported."""
 
 LATE = 0.4
 """Weight of the pace at the trial's end against the pace of all of it, in logarithms: of 76 random
@@ -411,7 +411,7 @@ crowds that were cut off after 0.1 s the pace of all of it is too low by 4 for o
 at the end too high by 9."""
 
 CROWDED = 2.0
-"""How much longer a particle of a crowd takes to land or settle than one by itself, about."""
+"""Factor by which a particle of a crowd takes longer to land or settle than one alone, about."""
 
 REST = 2e-10
 """s; time between the last bounces before rest, about, in the exact engine."""
@@ -449,7 +449,7 @@ def effort(machine: Machine, tried: Trial, setup: float, grown: int) -> Effort:
     elif some == count:
         guesses, share = _paces(tried, recording, _shares(tried, recording), together)
         if together and machine.until == "settled":
-            # It may also take all the time that the scene allows.
+            # The run may also take all the time that the scene allows.
             later, _ = _paces(tried, recording, tried.marks[:, 1], together)
             guesses += later
     else:
@@ -476,7 +476,7 @@ def _together(recording: Recording) -> bool:
 def _paces(
     tried: Trial, recording: Recording, shares: Floats, together: bool
 ) -> tuple[list[float], float]:
-    """Return how long a run takes, s, at the pace of all the trial and of the second half of it.
+    """Return the run's time, s, estimated from the whole trial and from its second half.
 
     The latter grows with the number of particles that are there, if they are stepped together. And
     the share of the run that the trial got through; `shares` are those at its marks.
@@ -532,10 +532,10 @@ def _shares(tried: Trial, recording: Recording) -> Floats:
 
 
 def _bounces(recording: Recording) -> list[float]:
-    """Return how many times as long as a trial a run of the exact engine takes.
+    """Return the ratio of the run's time to the trial's, for the exact engine, twice.
 
-    Its particles run one after the other. Twice: with bounces that follow each other as much
-    faster, or less, than the last ones told as their scatter allows.
+    Its particles run one after the other. The two values assume that bounces follow each other as
+    much faster, or slower, than the last ones as their scatter allows.
     """
     under_way = np.flatnonzero(recording.released & recording.ended_by("stopped"))
     one = int(under_way[0] if len(under_way) else np.count_nonzero(recording.released) - 1)
@@ -584,7 +584,7 @@ def _left(times: Floats, end: float) -> tuple[float, float]:
 
 
 RECORDED = 3.2
-"""Bytes of memory for a byte of knots and events, at the peak: as they came, sorted and joined."""
+"""Bytes of memory at the peak per byte of knots and events: as recorded, sorted and joined."""
 
 OWN = {"exact": 500.0, "contact": 20e3, "pymunk": 10e3}
 """Bytes that an engine sets up for a particle."""

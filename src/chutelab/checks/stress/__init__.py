@@ -1,14 +1,14 @@
 """Numerical stability: the laws that a run must keep, whatever the scene.
 
 Here are the laws on energy, ledger, momentum and the record, all laws by name, and `judge`. A law
-takes `Evidence` and answers with a `Verdict`, or with None where it says nothing. Bounds are
-argued, not fitted: for the exact engine rounding, for the others also what may happen in a step.
+takes `Evidence` and returns a `Verdict`, or None if it does not apply. Bounds are derived, not
+fitted: from rounding for the exact engine, for the others also from what may happen in a step.
 
-- `barriers`: what a law looks at, how it answers; laws on where no particle may be, and on blows.
+- `barriers`: the evidence and the verdict of a law; laws on places and on impacts.
 
-Where surfaces are is said by `machine.shapes`, which no engine uses to find a contact. What every
-run is judged by is `results.laws`, which also finds what is inside a surface. The scenes that are
-hard on an engine, and what each asks for besides, are in ``tests/stress``.
+The places of surfaces come from `machine.shapes`, which no engine uses to find a contact. The laws
+of every run are in `results.laws`, which also finds particles inside a surface. Scenes that are
+hard for an engine, with further requirements of each, are in ``tests/stress``.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def lasting(e: Evidence) -> Verdict:
 
 
 def energy(e: Evidence) -> Verdict | None:
-    """Kinetic and potential energy never rise but by a belt's work.
+    """Kinetic and potential energy rise only by a belt's work.
 
     The figure is the largest rise above any earlier value, as a share of the energy in play.
     """
@@ -112,11 +112,11 @@ def energy(e: Evidence) -> Verdict | None:
 def _energy_of_crowd(e: Evidence) -> Verdict:
     knots = e.recording.knots
     times = np.unique(knots["t"])
-    # Times that rounding alone keeps apart are one instant: of two that meet again and again within
-    # it, one track may have each meeting, the other only the last.
+    # Times that differ only by rounding are one instant: if two particles meet repeatedly within
+    # it, one track may have each contact and the other only the last.
     times = times[np.diff(times, append=np.inf) > ROUNDINGS * EPS * np.abs(times).max()]
     if e.alike:
-        # Chipmunk knows velocities at steps only; in between a track turns as a cubic does.
+        # Chipmunk has velocities only at steps; in between the track is a cubic.
         span = e.machine.end_time - e.machine.releases.t[0]
         share = (times - e.machine.releases.t[0]) / span * ceil(span / e.dt - 1e-9)
         times = times[np.abs(share - np.rint(share)) < 1e-6]
@@ -146,11 +146,11 @@ def residual(e: Evidence) -> Verdict | None:
 
 
 def momentum(e: Evidence) -> Verdict | None:
-    """Contacts between particles leave their total momentum as it is.
+    """Contacts between particles conserve their total momentum.
 
-    Without surfaces gravity alone changes it, also of one that has left for good; on frictionless
-    surfaces with one normal, the part along them stays. The figure is a share of the sum of all
-    sizes m |v|.
+    Without surfaces only gravity changes it, also after particles have left. On frictionless
+    surfaces with one normal, its part along them is conserved. The figure is a share of the sum of
+    all m |v|.
     """
     m = e.machine
     if not e.machine.interact or not all(isinstance(piece, Segments) for piece in e.machine.pieces):
@@ -175,12 +175,12 @@ def momentum(e: Evidence) -> Verdict | None:
 
 
 BORNE = 1e-9
-"""Share of all impulses that loads may be off the change of momentum: rounding, and what is counted
-at a step's end instead of within it."""
+"""Share of all impulses by which loads may differ from the change of momentum: rounding, and
+impulses that are booked at the end of a step instead of within it."""
 
 
 def loads(e: Evidence) -> Verdict | None:
-    """Surfaces bear what changes the momentum of all particles, less their weight.
+    """Compare the loads on surfaces with the change of momentum less the weight.
 
     The figure is a share of all impulses on surfaces and all sizes m |v|.
     """
@@ -197,11 +197,11 @@ def loads(e: Evidence) -> Verdict | None:
 
 
 def spin(e: Evidence) -> Verdict | None:
-    """Without surfaces and gravity contacts leave the total angular momentum as it is.
+    """Without surfaces and gravity contacts conserve the total angular momentum.
 
-    Two disks that overlap by δ feel the impulse at arms that differ from r by δ/2: so the figure, a
-    share of the sum of all sizes m (|x - x0| + r) |v|, may be as large as the deepest overlap that
-    was found is of the radius.
+    For two disks that overlap by δ the arms of the impulse differ from r by δ/2. So the figure, a
+    share of the sum of all m (|x - x0| + r) |v|, may be as large as the deepest overlap found, in
+    radii.
     """
     m = e.machine
     if not e.machine.interact or e.machine.pieces or m.gravity > 0.0:
@@ -227,7 +227,7 @@ def spin(e: Evidence) -> Verdict | None:
 
 
 def need_judged(scene: Scene) -> None:
-    """Raise a `SceneError` unless the laws are about a scene: disks and what stays where it is."""
+    """Raise a `SceneError` unless the laws apply to a scene: disks and fixed surfaces."""
     allowed = "not judged: the laws are about disks without joints"
     faults = [
         Fault(f"{scene.head('particle', i)}.shape", kind.shape, allowed)
@@ -247,11 +247,11 @@ UNSEEN = ("nothing through", "nothing through another")
 
 
 def unseen(e: Evidence) -> str:
-    """Return why a disk may get to the wrong side in this run, empty if it may not.
+    """Return the reason why a disk may get to the wrong side in this run; empty if it cannot.
 
-    Where steps are all alike Chipmunk looks for contacts at their ends only. A disk that goes
-    farther than its radius in one may have its centre on the other side then, to which it is
-    pushed. So the pymunk engine does not promise the laws named in `UNSEEN` there.
+    With steps of equal length Chipmunk looks for contacts only at their ends. If a disk moves by
+    more than its radius in a step, its centre may then be on the other side, and it is pushed
+    there. So the pymunk engine does not promise the laws in `UNSEEN` there.
     """
     velocity, r = e.recording.knots["velocity"], e.radii[e.recording.owner]
     if not e.alike or not len(velocity):
@@ -288,7 +288,7 @@ LAWS: dict[str, Law] = {
 
 
 def judge(e: Evidence) -> list[Verdict]:
-    """Judge a run by every law that says something about it."""
+    """Judge a run by every law that applies to it."""
     found = []
     for name, law in LAWS.items():
         if (verdict := law(e)) is not None:

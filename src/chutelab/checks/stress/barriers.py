@@ -1,6 +1,6 @@
-"""What a law looks at, a run and the numbers in play, how it answers; and the laws on places.
+"""The evidence and the verdict of a law; the laws on places and on impacts.
 
-No particle is beyond a surface or in another one; and what a blow may do.
+No particle is beyond a surface or inside another particle; impacts obey friction and restitution.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from chutelab.util.arrays import Floats, Ints
 EPS: float = number("EPS")
 
 PRESSED: float = number("PRESSED")
-"""Share of the radius by which disks of a crowd may be pressed into each other or into a surface:
-what the contact engine promises. A solver that iterates leaves some."""
+"""Share of the radius by which disks of a crowd may overlap each other or a surface; the contact
+engine promises this. An iterative solver leaves some overlap."""
 
 A_CONTACT: int = number("A_CONTACT")
-"""eps that one contact may move an energy by: half an ulp for each of two velocity components, a
+"""Rounding of an energy in one contact, in eps: half an ulp for each of two velocity components, a
 height and a sum."""
 
 ROUNDINGS: int = number("ROUNDINGS")
-"""Roundings that one number may have gone through between two contacts: some ten operations, each
-on numbers up to some ten times as large as what comes out."""
+"""Roundings of one number between two contacts: some ten operations on numbers up to ten times as
+large as the result."""
 
 ON_ARCS: float = number("ON_ARCS")
 """Share of its radius by which a cubic between two knots may leave a circle: the recording's
@@ -58,12 +58,12 @@ class Evidence:
 
     @property
     def alike(self) -> bool:
-        """Whether Chipmunk finds and solves all contacts, in equal steps."""
+        """Whether Chipmunk finds and solves all contacts, in steps of equal length."""
         return alike(self.recording)
 
     @cached_property
     def radii(self) -> Floats:
-        """Radius of each particle, (N,), m; of one with corners that of the circle inside."""
+        """Radius of each particle, (N,), m; for one with corners that of the inner circle."""
         return self._of_each(inner_radius(self.machine))
 
     @cached_property
@@ -91,12 +91,12 @@ class Evidence:
 
     @cached_property
     def found(self) -> Findings:
-        """What the laws of every run find, see `results.laws`."""
+        """Findings of the laws of every run, see `results.laws`."""
         return examine(self.recording)
 
     @property
     def bounds(self) -> Any:
-        """Numbers in play and what they bound, under the names of the core's `Laws` (layout.h)."""
+        """Sizes of numbers in the run, and bounds, by the names of the core's `Laws` (layout.h)."""
         return self.found.figures
 
 
@@ -104,15 +104,15 @@ class Evidence:
 class Verdict:
     """What a law found."""
 
-    figure: float  # the worst there was
-    bound: float  # what it must not exceed
+    figure: float  # the worst value
+    bound: float  # its upper bound
     detail: str = ""  # unit, and where it was
     law: str = ""
     unpromised: str = ""  # why the engine does not promise a law that is not kept; "" if it does
 
     @property
     def holds(self) -> bool:
-        """Whether the law is kept; it never is by a figure that is no number."""
+        """Whether the law is kept; NaN never keeps it."""
         return self.figure <= self.bound
 
     @property
@@ -128,13 +128,13 @@ def worst(found: Iterable[tuple[float, str]], bound: float, unit: str) -> Verdic
 
 
 AT_SURFACES = (Kind.IMPACT, Kind.LANDING, Kind.STICK, Kind.SLIP, Kind.SETTLE)
-"""What happens at a surface, if one is named."""
+"""Kinds of events at a surface, if one is named."""
 
 INSTANTS, PLACES = 1000, 200_000
-"""Times at which pairs of particles are looked at, and places, all particles together, at most."""
+"""Most times at which pairs of particles are checked, and most places of all particles together."""
 
 COLLISIONS = 300
-"""Collisions, and releases, at which that is done besides, at most."""
+"""Most collisions and releases at which this is done, too."""
 
 
 def nothing_through(e: Evidence) -> Verdict | None:
@@ -146,9 +146,9 @@ def nothing_through(e: Evidence) -> Verdict | None:
 
 
 def depth(e: Evidence) -> Verdict | None:
-    """No disk is deeper in a surface than rounding, or a step, allows; the figure is in m.
+    """No disk overlaps a surface by more than rounding, or a step, allows; the figure is in m.
 
-    It is 0 where all are proven to be no deeper. What overlapped at the release may go on doing so.
+    It is 0 if all are proven to stay within that. Overlaps at the release are allowed to stay.
     """
     if not e.machine.pieces or not len(e.recording.knots):
         return None
@@ -181,11 +181,11 @@ def overlap(e: Evidence) -> Verdict | None:
 
 
 def pressed(e: Evidence) -> Verdict | None:
-    """No two disks stay in each other for longer than a step; the figure is a share of the radius.
+    """No two disks overlap for longer than a step; the figure is a share of the radius.
 
-    It is the least overlap of a pair at two instants a step apart. Chipmunk parts what it finds
-    over several steps, a fifth in a millisecond, so it promises nothing on how long: there the
-    bound is that of `overlap`.
+    It is the least overlap of a pair at two times a step apart. Chipmunk removes overlaps over
+    several steps, a fifth in a millisecond, so it promises no duration: there the bound is that of
+    `overlap`.
     """
     if not e.machine.interact or e.dt is None:
         return None
@@ -202,8 +202,9 @@ def pressed(e: Evidence) -> Verdict | None:
 def nothing_through_another(e: Evidence) -> Verdict | None:
     """Slow disks do not pass through each other; the figure counts the pairs.
 
-    Slow are two that come nearer by less than the smaller radius in a step: an engine sees them in
-    touch before they are inside. They pass where the centre of the smaller gets into the other.
+    Slow means that they approach by less than the smaller radius per step, so that an engine
+    detects contact before one is inside the other. They pass if the centre of the smaller gets into
+    the other.
     """
     if not e.machine.interact or e.dt is None:
         return None
@@ -235,7 +236,7 @@ def _some(e: Evidence, kind: Kind) -> NDArray[Any]:
 
 
 def _pairs(e: Evidence, dt: float) -> Iterator[tuple[float, Ints, Floats, Floats]]:
-    """Yield instants, pairs (2, k) in touch then or a step later, and b - a (k, 2) at both, m."""
+    """Yield times, pairs (2, k) in contact then or a step later, and b - a (k, 2) at both, m."""
     reach = 2.0 * e.radius
     for now in _instants(e):
         (first, last), _ = e.recording.at([now, now + dt])
@@ -291,7 +292,7 @@ def on_something(e: Evidence) -> Verdict | None:
         i, j = int(hit["particle"]), int(hit["other"])
         (place,), _ = e.recording.at([hit["t"]])
         far = abs(np.hypot(*(place[j] - hit["position"])) - (e.radii[i] + e.radii[j]))
-        # Of a partner that is not there it is no number.
+        # Without the partner it is NaN.
         far = np.nan_to_num(far, nan=inf)
         found.append((far, f"particles {i} and {j} at t = {hit['t']:.6g} s"))
     if not found:
@@ -320,14 +321,14 @@ def released_free(e: Evidence) -> Verdict | None:
         other = int(np.argmax(deep))
         where = f"particle {event['particle']} in {other} at t = {event['t']:.6g} s"
         found.append((deep[other], where))
-    # One that is released just behind another, in touch, may be seen a rounding too near.
+    # A particle released in contact just behind another may overlap it by rounding.
     return worst(found, e.bounds.rounding, "m")
 
 
 def settled_to_stay(e: Evidence) -> Verdict | None:
-    """Nothing is settled that moves with a surface it will be thrown from; the figure counts them.
+    """No particle counts as settled on a surface that will throw it off; the figure counts them.
 
-    That is any surface that moves, but for the outgoing belt.
+    That is any moving surface except the outgoing belt.
     """
     m = e.machine
     settled = np.flatnonzero(e.recording.ended_by("settled"))
@@ -351,7 +352,7 @@ values of both shapes, and a factor 0 would be 0 against surfaces too."""
 
 
 def cone(e: Evidence) -> Verdict | None:
-    """No blow pulls, or grips by more than the pair's friction times what it pushes.
+    """No impact pulls; its tangential impulse is at most friction times its normal impulse.
 
     The figure is the excess as a share of the largest momentum m v.
     """
@@ -373,12 +374,12 @@ def cone(e: Evidence) -> Verdict | None:
 
 
 def rebound(e: Evidence) -> Verdict | None:
-    """Judge whether speeds after blows are the restitution times the speeds before.
+    """Judge whether speeds after impacts are the restitution times the speeds before.
 
-    This is about one blow at a time, so not about crowds and corners. A stepped engine may let a
-    particle stay that would leave slower than gravity brings it back in a step, and the pymunk
-    engine knows speeds to what gravity does to them in one. A mass point has no contact normal to
-    be measured by. The figure is how far off it is, as a share of the largest speed.
+    This applies to single impacts, so not to crowds and corners. A stepped engine may let a
+    particle rest if gravity brings it back within a step, and the pymunk engine has speeds only to
+    the change by gravity in one step. A mass point has no contact normal. The figure is the
+    deviation as a share of the largest speed.
     """
     events = e.recording.select(Kind.IMPACT, Kind.LANDING)
     if e.alike or e.machine.interact or not e.radii.all():
@@ -405,18 +406,18 @@ def _verdict(events: NDArray[Any], off: Floats, unit: str, more: float = 0.0) ->
 
 
 def _struck(e: Evidence, events: NDArray[Any]) -> tuple[Ints, Floats, Ints]:
-    """Find what was struck at blows on surfaces (c,).
+    """Find the pieces that were struck in impacts on surfaces (c,).
 
-    Returned are the number of the nearest piece of the surface that is named, (c,); the way from
-    there to the centre, m, (c, 2); and how many pieces, of any surface, were as near as one that is
-    touched, (c,).
+    Return the number of the nearest piece of the named surface, (c,); the vector from there to the
+    centre, m, (c, 2); and how many pieces of any surface were near enough to be touched, (c,).
     """
     best, touched = np.full(len(events), inf), np.zeros(len(events), dtype=int)
     struck, away = np.zeros(len(events), dtype=int), np.zeros((len(events), 2))
     near = e.bounds.rounding + e.bounds.arcs + e.bounds.late
     for n, piece in enumerate(e.machine.pieces):
         out, face = piece.away(events["position"]), piece.normal(events["position"])
-        # Beside a face the way is along its normal; of small disks a place tells it roughly.
+        # Beside a face the vector is along its normal; for small disks positions give it only
+        # roughly.
         high = (out * face).sum(axis=1)[:, None] * face
         out = np.where((np.hypot(*(out - high).T) <= e.bounds.rounding)[:, None], high, out)
         off = np.abs(np.hypot(*out.T) - e.radii[events["particle"]])

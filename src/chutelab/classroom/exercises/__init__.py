@@ -6,9 +6,9 @@
 ? Question 1: not a number. That is text (“quickly”). Give a number, without quotes.
 
 `lesson` hands out a `Task`, with `question`, `check`, `hint`, `reveal` and `progress`; `data_of` is
-an exercise as data for a live page, which judges as this package does. There is no answer in the
-data: the page draws a student's numbers from the name and computes right and wrong answers from
-them. The way to the answer stands there as a template without numbers.
+an exercise as data for a live page, which judges as this package does. The data hold no answer: the
+page draws a student's numbers from the name and computes right and wrong answers from them. The
+working is a template without numbers.
 
 - `exercise`: what an exercise is made of: parameters, drawn from a name, questions, known mistakes.
 - `judging`: a number read and judged: right, a known mistake, or how far off; replies.
@@ -67,18 +67,18 @@ OPENED: Final[deque[Task]] = deque(maxlen=64)
 """The tasks of this process in the order they were opened; grading reads the answers here."""
 
 UNNAMED: Final = "your name"
-"""What stands in a notebook in place of the student's name."""
+"""Placeholder for the student's name in a notebook."""
 
 
 LONGEST_NAME: Final = 200
-"""Characters of a student's name."""
+"""Most characters of a student's name."""
 
 
 class Task:
     """One lesson's exercise with a student's own numbers, made by `lesson`.
 
-    None of its methods raises an error for what a student hands over; they answer in words. It
-    holds no right answer: that is computed for a reply, and forgotten.
+    None of its methods raises an error for a student's input; they reply in words. It holds no
+    right answer: that is computed for a reply, and forgotten.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Task:
     given : Values
         The student's parameters, as attributes.
     language : str
-        What the task speaks.
+        Language of the task.
     """
 
     def __init__(self, exercise: Exercise, student: str) -> None:
@@ -131,7 +131,7 @@ class Task:
         number : int
             Which question, from 1 on.
         answer : object
-            The student's number, or whatever stands in its place.
+            The student's number, or any other object given instead.
         """
         standing = self._found(number)
         if standing is None:
@@ -186,7 +186,7 @@ class Task:
         return Progress(f"{_exercise(self).title}, {self.student}", rows, self.language)
 
     def _found(self, number: object) -> Standing | None:
-        """Return how far the student got with a question, None if there is no such one."""
+        """Return the student's progress with a question, None if there is no such question."""
         if isinstance(number, str) and number.isdecimal():
             number = float(number)
         wanted = number_of(number)
@@ -232,7 +232,7 @@ def _exercise(task: Task) -> Exercise:
 
 
 def _case(task: Task, number: int, given: Values | None = None) -> Case:
-    """Return a question with a student's numbers, or those given, and what follows from them."""
+    """Return a question with a student's numbers, or with those given, and its computed values."""
     exercise, drawn = _exercise(task), given or task.given
     numbers = Numbers(
         {name: drawn[name] for name in drawn}, exercise.formulas, language=exercise.language
@@ -289,7 +289,7 @@ EXERCISES: Final[dict[str, Exercise]] = {
 
 @cache
 def told(name: str, language: str) -> Exercise:
-    """Return an exercise in a language; what is not translated is in English."""
+    """Return an exercise in a language; texts without a translation are in English."""
     english = EXERCISES[name]
     file = _HERE / f"{name}.{language}.toml"
     return english if language == "en" else translated(english, file, language)
@@ -330,8 +330,8 @@ def lesson(name: str | int, student: object = "", language: str = "en") -> Task:
         Any name; its text counts. The same name gives the same numbers on every machine; capitals
         and spaces do not matter.
     language : str
-        "en", or that of a translation, such as "de"; what is not translated is in English. The
-        numbers are the same ones.
+        "en", or the language of a translation, such as "de"; texts without a translation are in
+        English. The numbers are the same.
 
     Returns
     -------
@@ -363,13 +363,13 @@ SAID: Final = (
     "off", "pair", "pure", "question", "reply", "right", "small", "source", "tries",
     "untranslated", "verdict", "working",
 )  # fmt: skip
-"""First parts of the keys that pages need of the catalogue: none of cells, sheets, packages."""
+"""Prefixes of the catalogue's keys that pages need (not those of cells, sheets and packages)."""
 
 
 def data_of(exercise: Exercise, explain: str = "") -> dict[str, Any]:
     """Return an exercise as plain data for JSON, in its language, which is the page's.
 
-    `explain` is what students are to explain in their own words; "" for nothing.
+    `explain` is the question that students answer in their own words; "" for none.
     """
     said = words(exercise.language)
     return {

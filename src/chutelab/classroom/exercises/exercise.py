@@ -6,9 +6,9 @@ reply. A formula is a Python expression of the parameters, of other formulas and
 Texts are templates: ``{name}`` stands for a number, and a line break for a space. ``NAME.de.toml``
 has the texts in German, and nothing else: each takes the place of the English one.
 
-A few mistakes are known of every question: a sign, a power of ten, radians, ½. A student's own
-parameters are drawn from the name, the same on every machine, and redrawn until every mistake can
-be told from the others.
+Every question has a few general mistakes: a sign, a power of ten, radians, ½. A student's
+parameters are drawn from the name, the same on every machine, and redrawn until all mistakes can be
+told apart.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from chutelab.theory import transfer
 from chutelab.util.words import words
 
 DIGITS: Final = 4
-"""Significant digits of numbers in texts: more than any tolerance here can tell apart."""
+"""Significant digits of numbers in texts; their rounding is far below any tolerance here."""
 
 TOLERANCE: Final = 0.01
 """Relative difference within which an answer counts as right."""
 
 ROUNDED: Final = 3
-"""Significant digits that are asked for: rounding to them costs at most half the tolerance."""
+"""Significant digits asked for in answers: rounding to them takes at most half the tolerance."""
 
 
 class Values:
@@ -127,7 +127,7 @@ class Numbers(dict[str, Any]):
         self.known = {**FUNCTIONS, "g": gravity, "transfer": carried}
 
     def __missing__(self, name: str) -> Any:
-        # A KeyError sends `eval` on to FUNCTIONS.
+        # After a KeyError `eval` looks in FUNCTIONS.
         self[name] = value = self.of(self.formulas[name])
         return value
 
@@ -144,7 +144,7 @@ class Numbers(dict[str, Any]):
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number that is drawn for a student, from round `values`.
+    """One number that is drawn for a student from round `values`.
 
     Templates and formulas call it by its name; the student's table has symbol, unit and meaning.
     """
@@ -160,11 +160,11 @@ class Parameter:
 class Mistake:
     """A mistake that is recognised by the number it leads to.
 
-    What the student is told is a template: what seems to have happened, never the right number.
+    The reply is a template: it says what seems to have happened, never the right number.
     """
 
     name: str  # a few words in English; a general mistake of this name is left out
-    formula: str  # of the wrong answer
+    formula: str  # formula of the wrong answer
     says: str
     called: str = ""  # its name in the learner's language; "": `name`
 
@@ -177,7 +177,7 @@ class Question:
     text: str
     unit: str  # of the answer; "" for a pure number, "degrees" for an angle
     answer: str  # formula of the right number
-    mistakes: Sequence[Mistake]  # of this question; the general ones come on top
+    mistakes: Sequence[Mistake]  # of this question; the general ones are added
     hints: Sequence[str]  # each says more than the one before
     working: str  # the way to the answer, line by line
     source: str  # equation or law behind it
@@ -193,14 +193,14 @@ class Exercise:
     number: int  # of the lesson
     name: str  # such as the-bounce
     title: str
-    story: str  # what all questions share, a template
+    story: str  # text common to all questions, a template
     parameters: Sequence[Parameter]
     questions: Sequence[Question]
-    formulas: Mapping[str, str]  # what texts and other formulas need besides
-    tell: Sequence[str] = ()  # formulas whose numbers are told to the student too
-    fits: Sequence[str] = ()  # conditions of a draw that the lesson is about
+    formulas: Mapping[str, str]  # further formulas for texts and other formulas
+    tell: Sequence[str] = ()  # formulas whose numbers the student sees, too
+    fits: Sequence[str] = ()  # conditions that a draw must fulfil for the lesson
     # Keys of the lesson's scene, and their formulas: a machine with the student's numbers in it.
-    # Where a question has `measured`, the lesson's page lets that machine say what is right.
+    # If a question has `measured`, the lesson's page takes the right answer from that machine.
     machine: Mapping[str, str] = field(default_factory=dict)
     language: str = "en"  # of the texts
     whole: bool = True  # whether all texts are in that language
@@ -222,7 +222,7 @@ def read(file: Path) -> Exercise:
 
 
 def translated(exercise: Exercise, file: Path, language: str) -> Exercise:
-    """Return an exercise with the texts of a TOML file; what is not in there stays as it is."""
+    """Return an exercise with the texts of a TOML file; other texts stay as they are."""
     found = tomllib.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
     whole = True
 
@@ -267,31 +267,31 @@ GENERAL: Final = (
     ("mistake-half-missing", "reply-half-missing", 2.0),
     ("mistake-half-too-many", "reply-half-too-many", 0.5),
 )
-"""Mistakes that any question knows, besides powers of ten: keys of name and reply, and what each
-makes of a right answer of 1."""
+"""General mistakes of any question, besides powers of ten: keys of name and reply, and the wrong
+answer if the right one is 1."""
 
 OF_ANGLES: Final = (
     ("mistake-radians", "reply-radians", radians(1.0)),
     ("mistake-radians", "reply-degrees", degrees(1.0)),
 )
-"""Mistakes with answers in degrees."""
+"""General mistakes of answers in degrees."""
 
 BESIDES: Final = (
     ("mistake-sign", "besides-sign", -1.0),
     ("mistake-ten", "besides-large", 1e3),
     ("mistake-ten", "besides-small", 1e-3),
 )
-"""Common second mistakes, on top of one of the question's own."""
+"""Common second mistakes, combined with one of the question's own."""
 
 MOST_TENS: Final = 6
-"""Powers of ten, either way: from micro to mega."""
+"""Most powers of ten up or down: from micro to mega."""
 
 _RAISED: Final = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @cache
 def _general(language: str, *, angle: bool) -> tuple[Trace, ...]:
-    """Return the mistakes that any question knows, and those of angles, in a language."""
+    """Return the general mistakes of any question, and those of angles, in a language."""
     said = words(language)
 
     def trace(name: str, says: str, number: float) -> Trace:
@@ -312,12 +312,12 @@ def _general(language: str, *, angle: bool) -> tuple[Trace, ...]:
 
 
 LEAST: Final = 1e-9
-"""Smallest right answer, in its unit: below it there are no digits to judge."""
+"""Smallest right answer, in its unit; a smaller one would not show enough digits to judge."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One question for one student: its number, and the numbers behind it."""
+    """One question for one student: its number (from 1), and the student's values."""
 
     number: int
     question: Question
@@ -364,7 +364,7 @@ class Case:
 
     @property
     def clear(self) -> bool:
-        """Whether the right answer and every mistake can be told from each other."""
+        """Whether the right answer and all mistakes can be told apart."""
         wrong = [trace.number for trace in self.mistakes]
         numbers = [self.right, *wrong]
         if not all(map(isfinite, numbers)) or abs(self.right) < LEAST or 0.0 in wrong:
@@ -385,7 +385,7 @@ def normalized(student: str) -> str:
 
 
 def attempt(exercise: Exercise, student: str, number: int) -> tuple[Case, ...] | None:
-    """Return the cases of one draw, or None if it does not fit, or some mistake is not clear."""
+    """Return the cases of one draw; None if it breaks a condition or a mistake is not clear."""
     drawn = {}
     for parameter in exercise.parameters:
         key = "\n".join((exercise.name, normalized(student), parameter.name, str(number)))
@@ -402,7 +402,7 @@ def attempt(exercise: Exercise, student: str, number: int) -> tuple[Case, ...] |
 
 
 MOST_DRAWS: Final = 1000
-"""Most draws for a student; if none fits, the lesson is badly made."""
+"""Most draws for a student; if none fits, the exercise is badly made."""
 
 
 def draw(exercise: Exercise, student: str) -> tuple[Values, tuple[Case, ...]]:

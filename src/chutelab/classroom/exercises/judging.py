@@ -45,7 +45,7 @@ MARKS: Final = {
     Verdict.BLANK: ("○", GREY),
     Verdict.UNKNOWN: ("?", ORANGE),
 }
-"""Sign and colour of each verdict; the words always say it too."""
+"""Sign and colour of each verdict; the words always say the same."""
 
 
 def in_words(verdict: Verdict, language: str) -> str:
@@ -77,7 +77,7 @@ def table(rows: Sequence[tuple[str, ...]]) -> str:
 class Reply:
     """The reply to an answer."""
 
-    question: int  # its number; 0 if there is no such one
+    question: int  # number of the question; 0 if there is no such question
     verdict: Verdict
     text: str  # what to tell the student
     # the known mistake that it looks like, or empty: its name in English, and in `language`
@@ -110,9 +110,9 @@ class Reply:
 
 @dataclass(frozen=True, repr=False)
 class Passage:
-    """Something to read: a question, a hint, the working.
+    """A text: a question, a hint, or the working.
 
-    `number` is that of the question, `unit` that of the answer which is asked for.
+    `number` is that of the question, `unit` that of its answer.
     """
 
     number: int
@@ -160,7 +160,7 @@ class Standing:
 
 
 BAR, HEIGHT, GAP = 150, 12, 4
-"""Pixels: length and height of a part of the progress bar, and what is between two."""
+"""In pixels: length and height of a part of the progress bar, and the gap between two parts."""
 
 FAINT: Final = 0.35
 """Opacity of the parts that were not attempted."""
@@ -168,7 +168,7 @@ FAINT: Final = 0.35
 
 @dataclass(frozen=True, repr=False)
 class Progress:
-    """What is done of a task, a row for each question; the title says lesson and student."""
+    """Progress in a task, one row per question; the title says lesson and student."""
 
     title: str
     rows: tuple[Standing, ...]
@@ -214,11 +214,11 @@ class Progress:
 
 _NUMBER: Final = re.compile(r"\s*([-+−]?\d*[.,]?\d+(?:[eE][-+−]?\d+)?)\s*(.*)", re.DOTALL)
 _LONGEST: Final = 40
-"""Characters of a student's text that are shown back."""
+"""Most characters of a student's text that a reply quotes."""
 
 
 def number_of(answer: object, said: Words | None = None) -> float | str | None:
-    """Return the number that an answer is, None for no attempt, or else words: what to do instead.
+    """Return an answer as a number; None for no attempt; for anything else advice in words.
 
     The words are those of a language, by default of English.
 
@@ -292,9 +292,9 @@ def is_rounded(answer: float, number: float) -> bool:
 def judge(case: Case, answer: float, others: Iterable[tuple[str, float]] = ()) -> Reply:
     """Judge a finite answer.
 
-    It is the right one, or a known mistake, or the right one of another student, or two mistakes at
-    once, or off. `others` are name and right answer to the same question of others; they are looked
-    at only if need be.
+    It is right, a known mistake, another student's right answer, two mistakes at once, or off.
+    `others` yields names and right answers of others to the same question; it is used only if
+    needed.
     """
     said = words(case.numbers.language)
 
@@ -312,7 +312,7 @@ def judge(case: Case, answer: float, others: Iterable[tuple[str, float]] = ()) -
         if is_rounded(answer, number):
             known, called = (one.say("mistake-others") for one in (words(), said))
             return reply(Verdict.MISTAKE, said.say("reply-others", name=name), known, called)
-    # Two mistakes rarely give a close answer; if several pairs give this number, none is named.
+    # Name two mistakes only if exactly one pair gives this number.
     near = abs(answer / case.right - 1.0) <= CLOSE
     pairs = [trace for trace in case.pairs if is_close(answer, trace.number)]
     if len(pairs) == 1 and not near:
@@ -326,7 +326,7 @@ def number_with_unit(number: float, unit: str, said: Words) -> str:
 
 
 FAR: Final = 10.0
-"""From this ratio on, "more than 10 times" is said, not a percentage."""
+"""From this ratio on the reply says "more than 10 times" instead of a percentage."""
 
 
 def _distance(case: Case, answer: float, said: Words) -> str:

@@ -3,7 +3,7 @@
 Here is ``lesson.toml`` as a frozen model, validated with its scenes, all faults in one message; and
 the shipped lessons, found by number, by name or by folder.
 
-- `steps`: what is asked in each step, what may be changed, which runs a table wants.
+- `steps`: the questions of each step, the keys that may be changed, the runs of its table.
 - `texts`: a lesson's Markdown as HTML and for a terminal, and its formulas.
 - `sheets`: the student's sheet, the teacher's and the explanation, as Markdown, HTML and PDF.
 - `building`: ``lesson.gif``, ``exercise.ipynb``, a new lesson from a template.
@@ -165,7 +165,7 @@ class Lesson(Table):
 
     @property
     def untranslated(self) -> tuple[str, ...]:
-        """What there is in English only: keys of ``lesson.toml``, and files."""
+        """Parts without a translation: keys of ``lesson.toml``, and files."""
         return self._untranslated
 
     @property
@@ -185,12 +185,12 @@ class Lesson(Table):
 
     @property
     def columns(self) -> dict[str, Column]:
-        """What its tables tell of a run, by formulas."""
+        """Formulas of the columns of its tables."""
         return {one.value: one for step in self.steps for one in step.columns if one.value}
 
 
 def split(folder: Path) -> tuple[int | None, str]:
-    """Return number and name of a lesson's folder, None for one without a number."""
+    """Return number and name of a lesson's folder; the number is None if it has none."""
     match = re.fullmatch(r"(\d+)-(.*)", folder.name)
     return (int(match[1]), match[2]) if match else (None, folder.name)
 
@@ -212,7 +212,7 @@ OWN_WORDS: Final = "explanation"
 """Id of the cell of a notebook in which a student writes in words."""
 
 LARGEST: Final = 1 << 20
-"""Bytes of it."""
+"""Most bytes of ``lesson.toml``."""
 
 
 class LessonError(SceneError):
@@ -232,7 +232,7 @@ def read(folder: str | Path, language: str = "en") -> Lesson:
     folder
         Where ``lesson.toml`` is.
     language
-        Of its texts; what there is not in it is in English.
+        Of its texts; texts without a translation are in English.
 
     Raises
     ------
@@ -259,7 +259,7 @@ def read(folder: str | Path, language: str = "en") -> Lesson:
         raise unusable(source, "not UTF-8 text; save the file as UTF-8") from None
     except (ValueError, RecursionError) as error:
         raise unusable(source, f"not TOML: {error}") from None
-    words(language)  # refuses a language that there is not
+    words(language)  # refuses an unknown language
     document = in_language(document, language, untranslated)
     faults: list[Fault] = []
     sound = document
@@ -285,7 +285,7 @@ def read(folder: str | Path, language: str = "en") -> Lesson:
 def _strays(folder: Path) -> list[Fault]:
     """Return the files of a folder that are links to files elsewhere.
 
-    A page or a copy of the lesson would have what is in them.
+    A page or a copy of the lesson would contain those files.
     """
     home = os.path.realpath(folder)
     try:
@@ -337,7 +337,7 @@ def picture_of(lesson: Lesson, name: str) -> str:
 
 
 def _misfits(lesson: Lesson) -> Iterator[Fault]:
-    """Yield faults of several keys: scenes that do not load, names that are not in them."""
+    """Yield faults that concern several keys: scenes that do not load, names not in them."""
     scenes: dict[str, Scene] = {}
     for i, name in enumerate(lesson.scenes):
         here = f"scenes[{i}]"
@@ -396,7 +396,7 @@ def _faults(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:
     """Return the errors of a validation in words, one fault a key."""
     faults: dict[tuple[str | int, ...], Fault] = {}
     for detail in error.errors(include_url=False):
-        # The key, without the indices of what is in its value, and the table it is in.
+        # The key, without indices inside its value, and its table.
         loc = detail["loc"]
         table: type[Table] | None = Lesson
         for n, part in enumerate(loc):

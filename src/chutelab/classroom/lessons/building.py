@@ -1,8 +1,8 @@
-"""What is made of a lesson: its film and its notebook, and new lessons.
+"""Build a lesson's film and notebook; start new lessons.
 
 ``lesson.gif``, in another language ``lesson.LANGUAGE.gif``, is made anew only if what it is made
-from has changed; the stamp that tells is kept in a comment of the GIF itself. A new lesson comes
-from the template or is a copy of another: it validates and builds at once.
+from has changed; a stamp of its inputs is kept in a comment of the GIF. A new lesson comes from the
+template or is a copy of another: it validates and builds at once.
 
 ``exercise.ipynb`` has the steps, ``exercise.LANGUAGE.ipynb`` has them in another language; the runs
 of tables are made by `classroom.book`. ``notebook.py``, in the percent format, has what only the
@@ -57,7 +57,7 @@ MOST_PIXELS: Final = 3840 * 2160
 """Most pixels of a picture, as in `lessons.Picture`."""
 
 NO_SETTINGS: Final = {"scene", "set", "machine", "film"}
-"""Keys of `lessons.Picture` that are no settings of the film: which scene, and its words."""
+"""Keys of `lessons.Picture` that are not settings of the film: the scene and the texts."""
 
 LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
 """Packages whose versions determine the bytes of a picture, besides its inputs."""
@@ -112,7 +112,7 @@ def build(
             split = path.with_name(SPLIT)
             split_velocity(recording, split)
             with Image.open(split) as drawn:
-                # It is in the lesson's page, which is to be small.
+                # The lesson's page contains it and should be small.
                 few = drawn.convert("RGB").quantize(32, dither=Image.Dither.NONE)
             few.save(split, optimize=True)
     return Built(path, path.stat().st_size, made)
@@ -288,7 +288,7 @@ def notebook_of(lesson: Lesson) -> str:
                 if not all(one.value or one.given for one in step.columns):
                     text(f"{place}-table", say("notebook-fill"), table(step, said))
             case "explain":
-                # What is graded is in a cell of a name of its own: the last one's.
+                # The cell that is graded has its own id: the last one.
                 last = not any(one.kind == "explain" for one in lesson.steps[n:])
                 if step.asks:
                     text(OWN_WORDS if last else f"{place}-words", say("notebook-words"))

@@ -52,7 +52,7 @@ END: Final = "end.png"
 """The first picture of the film, and the last one: the answer is in it."""
 
 _NOT_GIVEN: Final = re.compile(r"lesson(\..+)?\.toml")
-"""Not given to students: the teacher's key is in it."""
+"""Not given to students: it contains the answers."""
 
 _SHARED: Final = ("style.css", "picture.js")
 
@@ -216,7 +216,7 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
     exercise, said = None, words(lesson.language)
     steps = data_of_steps(lesson.steps, tuple(scene.live.controls or ()), said)
     for step, data in zip(lesson.steps, steps, strict=True):
-        # What stands there until the page puts a field in its place, and on paper.
+        # Text until the page puts a field in its place, and on paper.
         value = values_of(lesson, step)
         for key in dict.fromkeys(_FIELD.findall(data["text"])):
             place = f'<span data-key="{key}">'
@@ -270,7 +270,7 @@ def _page(name: str, said: Words, **values: str) -> str:
 
 
 _PACKED: Final = ("imsmanifest.xml", "index.html", "scorm.js")
-"""What a package has besides the live page."""
+"""Files of a package besides the live page."""
 
 
 def package(lesson: Lesson, path: str | Path) -> Path:
@@ -313,7 +313,7 @@ def _zip(path: Path, contents: Mapping[str, bytes]) -> None:
 
 
 _SOURCES: Final = (".c", ".h", ".pyc", ".ts")
-"""Endings of files that a wheel does without."""
+"""Endings of files that are left out of the wheel."""
 
 _FORM: Final = b"""\
 Wheel-Version: 1.0

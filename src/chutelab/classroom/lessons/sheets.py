@@ -1,8 +1,8 @@
-"""Three sheets, and what they are printed as: Markdown, a web page in one file, a PDF on A4.
+"""The three sheets of a lesson as Markdown, as a web page in one file, and as a PDF on A4.
 
-All are made of the lesson's steps: the student's asks, the explanation has what is said when steps
-are done, the teacher's has plan, key, goals and mistakes, with the table ``[teacher]`` and the
-exercise. They are in the lesson's language.
+All are made from the lesson's steps: the student's sheet has the questions, the explanation the
+texts after each step, the teacher's sheet plan, answers, goals and mistakes, from the table
+``[teacher]`` and the exercise. They are in the lesson's language.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SHEETS: Final = ("student", "teacher", "explanation")
 def sheet(lesson: Lesson, which: str) -> str:
     """Return one of `SHEETS` of a lesson, as Markdown.
 
-    The student's sheet asks, and has no number of the answer on it.
+    The student's sheet has the questions, and no number of the answers.
     """
     say, title = words(lesson.language).say, titled(lesson)
     film = f"![{lesson.picture.film or lesson.title}]({picture_of(lesson, 'lesson.gif')})"
@@ -58,7 +58,7 @@ def sheet(lesson: Lesson, which: str) -> str:
 
 
 def titled(lesson: Lesson) -> str:
-    """Return what stands above a lesson's sheets and its notebook."""
+    """Return the heading of a lesson's sheets and its notebook."""
     number, title = lesson.number, lesson.title
     say = words(lesson.language).say
     return title if number is None else say("sheet-title", number=number, title=title)
@@ -83,7 +83,7 @@ def worksheet(lesson: Lesson) -> str:
 
 
 def asked(lesson: Lesson, step: Step) -> Iterator[str]:
-    """Yield the parts of what a step asks, as Markdown: its text, its questions, its table."""
+    """Yield the parts of a step as Markdown: its text, its questions, its table."""
     said = words(lesson.language)
     yield with_values(lesson, step, step.text)
     for n, ask in enumerate(step.asks, 1):
@@ -104,19 +104,19 @@ def asked(lesson: Lesson, step: Step) -> Iterator[str]:
 
 
 def values_of(lesson: Lesson, step: Step) -> Callable[[str], str]:
-    """Return what says the value that a key has in a step's machine, with its unit."""
+    """Return a function that gives a key's value in a step's machine, with its unit."""
     scene, said = machine_of(lesson, step), words(lesson.language)
     return lambda key: number_with_unit(value_at(scene, key), unit_of(parts_of(key)), said)
 
 
 def with_values(lesson: Lesson, step: Step, text: str) -> str:
-    """Return a text of a step in which the machine's values stand where a page has fields."""
+    """Return a text of a step with the machine's values in place of the page's fields."""
     value = values_of(lesson, step)
     return PLACES.sub(lambda found: value(found[1]), text).strip()
 
 
 def table(step: Step, said: Words) -> str:
-    """Return the table of a step as Markdown, with empty cells for what is to be found."""
+    """Return the table of a step as Markdown, with empty cells for results."""
     heads = (f"{one.head}, {said.unit(one.unit)}" if one.unit else one.head for one in step.columns)
     lines = [[said.say("sheet-run"), *heads], ["---"] * (1 + len(step.columns))]
     for n, row in enumerate(step.rows):
@@ -150,7 +150,7 @@ def _for_the_teacher(lesson: Lesson) -> str:
     plan = ""
     for n, step in enumerate(lesson.steps, 1):
         text = step.text or " ".join(ask.text for ask in step.asks) or say("sheet-numbers")
-        # Of what it says the first sentence.
+        # The first sentence of its text.
         first, *_ = re.split(r"(?<=[.?!:])\s+", with_values(lesson, step, text), maxsplit=1)
         about = " ".join(first.split())
         plan += f"\n| {n} | {say(f'step-{step.kind}')} | {step.minutes} | {about} |"
@@ -178,13 +178,13 @@ def _for_the_teacher(lesson: Lesson) -> str:
 
 
 def _answer(ask: Ask) -> str:
-    """Return the key to a question."""
+    """Return the answer to a question."""
     chosen = ask.choices[ask.right - 1] if ask.choices and ask.right else ""
     return f"{chosen}. {ask.answer}".strip() if chosen else ask.answer
 
 
 def _of_exercise(lesson: Lesson, said: Words) -> dict[str, str]:
-    """Return the key to the exercise, and the mistakes that its replies name, as sections."""
+    """Return the answers to the exercise, and the mistakes that its replies name, as sections."""
     if lesson.name not in EXERCISES:
         return {}
     exercise, say = told(lesson.name, lesson.language), said.say
@@ -216,8 +216,8 @@ FORMATS: Final = ("md", "html", "pdf")
 def printed(lesson: Lesson, which: str, kind: str) -> bytes:
     """Return one of the `SHEETS` of a lesson as a file of one of `FORMATS`, in its language.
 
-    Raises a `LessonError` if the lesson has no such sheet; a `PrintError` if it is to be a PDF, and
-    the extra that sets it is not installed.
+    Raises a `LessonError` if the lesson has no such sheet; a `PrintError` if a PDF is asked for and
+    the extra for it is not installed.
     """
     markdown = sheet(lesson, which)
     if kind == "md":
@@ -278,7 +278,7 @@ def web_page(
 
 
 def need_typst() -> None:
-    """Raise a `PrintError` if no PDF can be set."""
+    """Raise a `PrintError` if no PDF can be made."""
     if find_spec("typst") is None:
         raise PrintError(
             'a sheet as PDF needs what is not installed: pip install "chutelab[pdf]"; a web page'
@@ -297,8 +297,8 @@ def pdf(
 ) -> bytes:
     """Return Markdown as a PDF on A4; a `PrintError` says what to install.
 
-    Pictures lie in a folder; of a film it shows the last one. After `asked` there is room to write.
-    With `dense` letters are smaller, and no table is broken over pages.
+    Pictures are in a folder; a film is shown by its last picture. After `asked` there is room to
+    write. With `dense` letters are smaller, and no table is split over pages.
     """
     need_typst()
     import typst
@@ -307,7 +307,7 @@ def pdf(
         place, found = Path(made), dict(_pictures(folder, tree))
         for node in tree.walk():
             if node.type == "image" and node not in found:
-                node.attrs["src"] = ""  # its words stand for it
+                node.attrs["src"] = ""  # show its words instead
         for node, path in found.items():
             with Image.open(path) as picture:
                 # Of a film its last picture.
@@ -335,7 +335,7 @@ def _text(text: str) -> str:
 
 
 def _blocks(nodes: Iterable[SyntaxTreeNode], asked: Sequence[SyntaxTreeNode]) -> str:
-    """Return blocks of Markdown as Typst has them, with room to write after those of `asked`."""
+    """Return blocks of Markdown in Typst's language, with room to write after those in `asked`."""
     made = []
     for node in nodes:
         match node.type:
@@ -372,7 +372,7 @@ def _blocks(nodes: Iterable[SyntaxTreeNode], asked: Sequence[SyntaxTreeNode]) ->
 
 
 def _inline(node: SyntaxTreeNode) -> str:
-    """Return what is within a block as Typst has it."""
+    """Return the text of a block in Typst's language."""
     inside = "".join(_inline(child) for child in node.children)
     match node.type:
         case "text":

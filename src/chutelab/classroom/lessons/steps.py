@@ -1,7 +1,7 @@
-"""Steps of a lesson: what is asked, what may be changed, which runs a table wants.
+"""Steps of a lesson: questions, keys that may be changed, runs of a table.
 
-From them come the page, the worksheet, the teacher's sheet and the notebook, so all four ask the
-same. `data_of` is what the page is told; ``lessons/README.md`` describes the keys.
+Page, worksheet, teacher's sheet and notebook are made from them, so all four ask the same.
+`data_of` is the data for the page; ``lessons/README.md`` describes the keys.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ def key(default: Any, what: str, allowed: str, **limits: Any) -> Any:
 
 
 def in_language(value: Any, language: str, untranslated: list[str], path: str = "") -> Any:
-    """Return a document with each ``{en = ..., de = ...}`` replaced by what it says in a language.
+    """Return a document with each ``{en = ..., de = ...}`` replaced by its text in a language.
 
-    What has no such text is said in English, and its path is appended to `untranslated`.
+    Without such a text the English one is taken, and its path appended to `untranslated`.
 
     >>> in_language({"title": {"en": "Fall", "de": "Fall"}, "minutes": 45}, "de", [])
     {'title': 'Fall', 'minutes': 45}
@@ -65,7 +65,7 @@ SETTINGS: Final = 'a table of keys of the scene such as { "plate.angle_deg" = 20
 
 
 class Ask(Table):
-    """One thing to answer: a mark in the picture, a choice, a sketch, else in words."""
+    """One question: answered by a mark in the picture, a choice, a sketch, or in words."""
 
     text: Markdown = key(..., "What is asked", "a text")
     mark: Said | None = key(
@@ -83,14 +83,14 @@ class Ask(Table):
 
 
 class Row(Table):
-    """One run that a table wants."""
+    """One run for a table."""
 
     head: Said = key(..., "What the row is called", f"a text of 1 to {LONGEST} characters")
     set: Settings = key({}, "What is changed for it", SETTINGS)
 
 
 class Column(Table):
-    """What is noted of each run; without a value, or given, it is filled in by hand."""
+    """A column of a table; without `value` and `given` it is filled in by hand."""
 
     head: Said = key(..., "What the column is called", f"a text of 1 to {LONGEST} characters")
     value: Said | None = key(
@@ -145,10 +145,10 @@ TABLES: Final[dict[str, type[Table]]] = {
 """Model of each table of a step by its key."""
 
 PLACES: Final = re.compile(r"\{(gravity|[a-z]\w*(?:\.\w+)+)\}")
-"""Keys whose values stand in a text, such as ``{outgoing.speed}``: no groups of a formula."""
+"""Pattern of keys whose values stand in a text, such as ``{outgoing.speed}``; not TeX groups."""
 
 FUNCTIONS: Final = ("abs", "acos", "atan2", "cos", "degrees", "hypot", "radians", "sin", "sqrt")
-"""What formulas of columns know besides quantities."""
+"""Functions in formulas of columns."""
 
 
 def quantities_in(formula: str) -> list[str]:
@@ -164,11 +164,11 @@ def quantities_in(formula: str) -> list[str]:
 def faults_of(
     steps: Sequence[Step], machine: Callable[[Mapping[str, Any]], Scene], live: Mapping[str, Any]
 ) -> Iterator[Fault]:
-    """Yield what cannot be done on the page of the steps.
+    """Yield the parts of the steps that cannot be done on the page.
 
-    That is a key that cannot be changed there, a value out of its range, a quantity that the
-    machine has not, and lists that do not fit together. `machine` loads the machine with keys
-    changed, or raises a `SceneError`; `live` has what the page offers, ``controls`` and ``ranges``.
+    These are keys that cannot be changed there, values out of their range, quantities that the
+    machine lacks, and lists of different length. `machine` loads the machine with keys changed, or
+    raises a `SceneError`; `live` has what the page offers, ``controls`` and ``ranges``.
     """
     controls, ranges = tuple(live.get("controls", ())), live.get("ranges", {})
     for n, step in enumerate(steps):
@@ -242,8 +242,8 @@ def data_of(steps: Sequence[Step], controls: tuple[str, ...], said: Words) -> li
     """Return steps as plain data for the JSON of a page.
 
     Texts are HTML with MathML, heads and choices without paragraphs; `controls` of a step are all
-    that can be changed in it. The value of a column is a formula as `scene.conflicts.tree` has
-    it, in which a quantity is a name with dots. What is for the teacher is left out.
+    keys that can be changed in it. The value of a column is a formula as `scene.conflicts.tree`
+    returns it, in which a quantity is a name with dots. The teacher's parts are left out.
     """
     return [
         {

@@ -32,7 +32,7 @@ _POWERS: Final = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass
 class Part:
-    """A piece of a formula: a text, or a command with arguments; and what is set below and above.
+    """A piece of a formula: a text, or a command with arguments; with its sub- and superscript.
 
     `name` is "" for a text, "group", or the name of a command.
     """
@@ -46,7 +46,7 @@ class Part:
 
 
 def parsed(tex: str) -> list[Part]:
-    r"""Return the parts of a formula; a brace that is not closed ends with it.
+    r"""Return the parts of a formula; an open brace is closed at its end.
 
     >>> [(part.name or part.text, len(part.below)) for part in parsed(r"v_{3x} = \sqrt{2}")]
     [('v', 2), (' ', 0), ('=', 0), (' ', 0), ('sqrt', 0)]
@@ -176,12 +176,12 @@ _FORMULA: Final = re.compile(
 
 
 def asset(name: str) -> str:
-    """Return the text of a page's or a sheet's template, or of what belongs to it."""
+    """Return the text of a template of a page or sheet, or of a file that belongs to it."""
     return (ASSETS / name).read_text(encoding="utf-8")
 
 
 def parser() -> MarkdownIt:
-    """Return a parser of lessons' Markdown, for which raw HTML is text."""
+    """Return a parser of lessons' Markdown that treats raw HTML as text."""
     from mdit_py_plugins.dollarmath import dollarmath_plugin
 
     made = MarkdownIt("commonmark", {"html": False}).enable("table")
@@ -211,13 +211,13 @@ def mathml(tex: str, *, display: bool = False) -> str:
 def html_of(markdown: str) -> str:
     """Return the HTML of a worksheet, without its title and its pictures, which the page has.
 
-    Raw HTML is shown, not obeyed; formulas are MathML.
+    Raw HTML is shown as text; formulas are MathML.
     """
     read = parser()
     worksheet = SyntaxTreeNode(read.parse(markdown))
 
     def elsewhere(part: SyntaxTreeNode) -> bool:
-        """Tell whether a paragraph is a picture that the page shows elsewhere or leaves out."""
+        """Whether a paragraph is a picture that the page shows elsewhere or leaves out."""
         inside = [one for line in part.children for one in line.children]
         if part.type != "paragraph" or [one.type for one in inside] != ["image"]:
             return False
@@ -233,7 +233,7 @@ def html_of(markdown: str) -> str:
 
 
 def plain_of(markdown: str) -> str:
-    r"""Return a text for a terminal, which shows no pictures, under a title of its own.
+    r"""Return a text for a terminal, without pictures and without its title.
 
     >>> plain_of("# Title\n\n![x](x.gif)\n\nSee [it](it.ipynb), [doi](https://doi.org/1).\n")
     'See it, [doi](https://doi.org/1).\n'

@@ -1,13 +1,12 @@
 """The machine in Pymunk: Chipmunk finds the contacts and solves them.
 
-Nothing here is shared with the other engines but the machine and the recorder: the check from
-outside.
+It shares only the machine and the recorder with the other engines: an independent check.
 
-- `world`: the surfaces as a `pymunk.Space`; rides on the belt that holds; tracks.
+- `world`: the surfaces as a `pymunk.Space`; rides by adhesion; paths between contacts.
 - `lone`: one particle whose steps end at its contacts.
-- `shared`: all particles in one Space, in steps that are all alike.
-- `moving`: surfaces that move; strings, rods, springs and pins; rolling friction.
-- `shapes`: their bodies and shapes, chains for arcs, and what Chipmunk is told at a contact.
+- `shared`: all particles in one Space, in steps of equal length.
+- `moving`: moving surfaces; strings, rods, springs and pins; rolling friction.
+- `shapes`: bodies and shapes, chains for arcs, and values for Chipmunk's contacts.
 """
 
 from __future__ import annotations
@@ -25,22 +24,21 @@ from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
 
 LOOK, SLICE = 64, 0.05
-"""Steps and s of wall time between two reports of progress, about: whichever is over first."""
+"""A report of progress comes after so many steps or s of wall time, whichever is first."""
 
 
 def run(machine: Machine, progress: Progress | None = None) -> Record:
     """Run a machine in Pymunk.
 
     `progress` is called now and then with the share of the run that is done, and may end the run.
-    With `align`, a lone particle's blows are right to rounding error, its lasting contacts of order
-    2 in the step, which is no longer than `dt` and half a radius' way. Particles that meet, boxes,
-    what hangs on joints, surfaces that move or are solid from one side, air, and steps that are all
-    alike, are of order 1:
-    `dt` times the speed should be less than the radius, or half a box's width, or they overlap by
-    as much, and pass through surfaces.
+    With `align`, impacts of a lone particle are exact to rounding and its lasting contacts of order
+    2 in the step, which is at most `dt` and moves it by at most half a radius. Order 1 have
+    particles that meet, boxes, joints, surfaces that move or are solid from one side, air, and
+    steps of equal length: there `dt` times the speed should be less than the radius, or half a
+    box's width, or particles overlap by as much, and pass through surfaces.
 
     Raises a `ValueError` if a particle has no radius; a `StalledError`, which has the recording so
-    far, if a lone particle goes on without getting on.
+    far, if a lone particle makes no progress.
     """
     if np.min(machine.particle.radius) <= 0.0:
         raise ValueError("particle.radius = 0: pymunk needs disks with a radius above 0 m")

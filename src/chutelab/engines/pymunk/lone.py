@@ -1,11 +1,11 @@
 """One particle whose steps end at its contacts (``align = true``).
 
 Each step drifts for its first half, has Chipmunk change the velocity there, and drifts on: exact in
-free flight, of order 2 in lasting contact. When a flight meets a surface is asked of Chipmunk's own
-distance queries along its parabola; a blow is a step that takes no time.
+free flight, of order 2 in lasting contact. The time at which a flight meets a surface comes from
+Chipmunk's distance queries along its parabola; an impact is a step that takes no time.
 
-Not resolved, whatever the step: bounces lower than two hairs, h = 2 `World.hair`, some 1e-13 m. The
-particle lies by 2 √(2 h/g)/(1 - ε) too early, some 1e-6 s.
+Not resolved, whatever the step: bounces lower than h = 2 `World.hair`, some 1e-13 m. The particle
+comes to rest by 2 √(2 h/g)/(1 - ε) too early, some 1e-6 s.
 """
 
 from __future__ import annotations
@@ -35,44 +35,47 @@ from chutelab.results.recorder import EnoughError, Recorder, StalledError, Track
 from chutelab.util.arrays import Progress, bisected
 
 WEDGED = 1000
-"""Iterations of Chipmunk's solver for a disk held by several surfaces, each of which takes off a
-share: a wedge of 5° needs 200. One is exact for one contact."""
+"""Iterations of Chipmunk's solver for a disk held by several surfaces; a wedge of 5° needs 200. For
+one contact a single iteration is exact."""
 
 INSTANT = 1e-30
-"""s; the step that resolves a blow: nothing moves in it."""
+"""s; step that resolves an impact: nothing moves in it."""
 
 SEAM = 1e-6
-"""Share of `Machine.pace` in m/s plus the particle's speed; in a lasting contact, where a surface
-goes on in the next one, an approach this slow is no blow."""
+"""Share of the sum of `Machine.pace` (m/s) and the particle's speed. In a lasting contact, at the
+joint of two surfaces, a slower approach is not an impact."""
 
 STRIDE = 0.5
-"""Share of the radius that a step of a lasting contact may always be long: it meets every end."""
+"""Share of the radius by which a step of a lasting contact may move: no end is passed unnoticed."""
 
 STILL = 1e-6
-"""Share of a free fall's gain; a step that changes the velocity by less changes nothing."""
+"""Share of the speed gained in free fall; a step that changes the velocity by less changes
+nothing."""
 
 LEVERS = 2.0
-"""Share of hair over radius by which levers, and with them the speed of a rim, may be off."""
+"""Error of levers, and so of rim speeds, in units of hair over radius."""
 
 SLACK = 1e-9
-"""Share of the weight that is no load, and of the friction limit below which a contact grips."""
+"""A load below this share of the weight is none; friction below the limit by more than this share
+grips."""
 
 TILT = 2e-13
-"""Share of the momentum that is no load, where nothing weighs: rounding tilts normals so much."""
+"""Without gravity, an impulse below this share of the momentum is no load: rounding tilts normals
+by so much."""
 
 ROLLS = 20
-"""Steps in search of the couple that stops the turning: three, unless friction starts to slip."""
+"""Most tries for the couple that stops the rotation: three suffice unless friction slips."""
 
 WINDOW, GAINED = 30_000, 100
-"""Steps of Chipmunk's, and rounds of the loop, in which a particle must get on by so many `run.dt`.
+"""In so many steps of Chipmunk's a particle must advance by so many `run.dt`, else it is stuck.
 They take 2 to 8 s. A ride round 1/1000 of the radius at 1 m/s needs a third of them."""
 
 TURNS = 200
-"""Blows at one instant, one surface after the other, before all are solved together."""
+"""Impacts at one instant, one surface after the other, before all are solved together."""
 
 
 class Contact(NamedTuple):
-    """What was done at one contact in one step.
+    """The impulses of one contact in one step.
 
     Impulses (N s) act on the particle, `push` along the normal n, `rub` along (n_y, -n_x); `belt`
     (m/s) is the surface's speed there, and `couple` (N m s) that of rolling friction.
@@ -87,7 +90,7 @@ class Contact(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step in lasting contact that may be taken: the state at its end, the place half-way."""
+    """A trial step in lasting contact: the state at its end, the place half-way."""
 
     x: Vec2d
     v: Vec2d
@@ -97,7 +100,7 @@ class Step(NamedTuple):
 
     @property
     def slips(self) -> int:
-        """Which way friction acts where it is used up, 0 if it is nowhere."""
+        """Sign of the friction where it reaches its limit, 0 if it does nowhere."""
         for c in self.contacts:
             if abs(c.rub) >= c.face.friction * c.push * (1.0 - SLACK):
                 # Without friction its sign is rounding.
@@ -124,19 +127,19 @@ class Lone:
         self.omega = float(start.omega[particle])
         self.body, self.circle = world.disk(particle)
         self.weight = self.body.mass * self.g
-        # Rolling friction's arm, m; nothing of what does not turn.
+        # Arm of rolling friction, m; 0 without rotation.
         turns = self.body.moment < inf
         self.arm = float(machine.rolling[start.kind[particle]]) * self.r if turns else 0.0
         world.space.add(self.body, self.circle)
         world.space.on_collision(PARTICLE, SURFACE, pre_solve=self._before, post_solve=self._after)
-        # The restitution of each surface that may be met in a step; what it did.
+        # The restitution of each surface that may be met in a step; its contacts.
         self.restitution: dict[Face, float] = {}
         self.contacts: list[Contact] = []
         # The surface that it lies on, -1 for none; `Step.slips` there, None at the beginning.
         self.on = -1
         self.slipping: int | None = None
         self.ended = self.landed = False
-        # The surfaces that are there, until when that is so, and gates that shut on the particle.
+        # The surfaces that exist now, until when that holds, and gates that closed on the particle.
         self.faces, self.changes, self.shut = world.faces, inf, set[Face]()
         if world.gates:
             self.faces = [face for face in world.faces if face.appears <= self.t < face.vanishes]
@@ -149,7 +152,7 @@ class Lone:
             return
         self._knot()
         self._tell(Kind.RELEASE)
-        # A carried particle is let go where no surface holds it.
+        # A carried particle is released where no surface holds it.
         released = bool(self.machine.releases.carried[self.particle])
         if released:
             self._carry()
@@ -159,7 +162,7 @@ class Lone:
             if self.world.gates and not released:
                 every = self.world.faces
                 there = [face for face in every if face.appears <= self.t < face.vanishes]
-                # A gate that shut on the particle waits till it is clear.
+                # A gate that closed on the particle acts once the particle is clear of it.
                 inside = {face for face in there if face.gap(self.x)[0] < -self.world.hair}
                 self.shut = inside.difference(self.faces)
                 self.faces = [face for face in there if face not in self.shut]
@@ -189,7 +192,7 @@ class Lone:
         self._look()
 
     def _look(self) -> None:
-        """Report the progress; end the track here if that was enough."""
+        """Report the progress; end the track here if the caller asks for it."""
         span = self.machine.end_time - float(self.machine.releases.t[self.particle])
         left = 0.0 if self.ended else (self.machine.end_time - self.t) / span
         try:
@@ -213,12 +216,13 @@ class Lone:
     # Chipmunk
 
     def _step(self, x: Vec2d, v: Vec2d, omega: float, h: float, g: Vec2d) -> list[Contact]:
-        """Have Chipmunk move the particle by v h, then change its velocity; return what pushed."""
+        """Have Chipmunk move the particle by v h, then change its velocity; return the contacts."""
         body, space = self.body, self.world.space
         for face in self.restitution:
             face.put(x + h * v)
         if h != self.last:
-            # Chipmunk keeps impulses for the next step, but right ones only if it is as long.
+            # Chipmunk starts from the impulses of the last step, which is right only for a step of
+            # equal length.
             space.remove(self.circle)
             space.add(self.circle)
             self.last = h
@@ -232,8 +236,8 @@ class Lone:
     def _rolled(self, x: Vec2d, v: Vec2d, h: float, g: Vec2d) -> list[Contact]:
         """Step, with the couple by which rolling friction opposes the spin.
 
-        Given before the step, friction bears it: as much as the pushes allow, or what stops the
-        turning, which is found between none and that much.
+        It is applied before the step, so that friction balances it. It is the largest that the
+        normal impulses allow, or what stops the rotation, found between 0 and that.
         """
         contacts = self._step(x, v, self.omega, h, g)
         if not self.arm or not contacts:
@@ -308,7 +312,7 @@ class Lone:
             self._knot()
 
     def _blow(self, touching: dict[Face, Vec2d]) -> None:
-        """Have Chipmunk resolve the blow from the surface that the particle moves into fastest."""
+        """Have Chipmunk resolve the impact on the surface that the particle approaches fastest."""
         before = self.v, self.omega
         if self.on >= 0:
             self._knot()
@@ -339,7 +343,7 @@ class Lone:
     def _rebound(self, face: Face, normal: Vec2d) -> float:
         """Return ε, or 0 where a rebound would be too slow or too low."""
         approach, weight = -self.v.dot(normal), -self.pull.dot(normal)
-        # What slides in a hollow is pressed on by that.
+        # Sliding inside an arc, it is also pressed on by the curvature.
         weight += face.hollow(self.x) * self.v.cross(normal) ** 2
         rebound = face.restitution * approach
         touch = approach <= self.world.tiny * (self.pace + self.v.length)
@@ -349,11 +353,11 @@ class Lone:
     # Lasting contact
 
     def _ride(self, touching: dict[Face, Vec2d], room: float) -> bool:
-        """Step on in contact, `room` (m) from all else; False if no surface pushes."""
+        """Step on in contact, `room` (m) away from all else; False if no surface pushes."""
         slow = SEAM * (self.pace + self.v.length)
         if all(self.v.dot(normal) > slow for normal in touching.values()):
             return False
-        # The step meets every end and every other surface, rather than pass them.
+        # The step is so short that no end and no other surface is passed unnoticed.
         rims = {face for face in touching if self.world.curved(face, self.x)}
         if rims:
             room = 0.0
@@ -370,8 +374,8 @@ class Lone:
             return self._trial(h, touching)
 
         def change(h: float) -> str:
-            """Return what changes in a step, nothing if it can be taken as it is."""
-            # The middle of a step twice as long stands for the end of this one.
+            """Return what changes within a step; empty if the step can be taken as it is."""
+            # Use the middle of a step twice as long for the end of this one.
             ahead = trial(2.0 * h)
             pushing = {c.face for c in ahead.contacts}
             if not pushing or any(self.world.curved(f, ahead.middle) for f in pushing - rims):
@@ -382,12 +386,12 @@ class Lone:
             beside = set(self.faces).difference(c.face for c in end.contacts)
             if any(face.gap(end.x)[0] < -0.25 * self.world.hair for face in beside):
                 return "meets"
-            # It grips, or turns back.
+            # It begins to grip, or reverses.
             return "slips" if self.slipping and end.slips != self.slipping else ""
 
         if change(h):
             least = SHORT * h
-            # A belt that grips may drive it into what it touches at once.
+            # A belt that grips may at once drive it into another surface that it touches.
             low, high = (0.0, least) if change(least) == "meets" else (least, h)
             before, after = bisected(change, low, high)
             what = change(after)
@@ -398,7 +402,7 @@ class Lone:
         pushing = [c.face.surface for c in end.contacts]
         surface = self.on if self.on in pushing or not pushing else pushing[0]
         if self.on >= 0 and surface != self.on:
-            # Over to another surface without a blow.
+            # It goes over to another surface without an impact.
             if surface == self.machine.landing and not self.landed:
                 self.landed = True
                 self._tell(Kind.LANDING, surface)
@@ -417,12 +421,12 @@ class Lone:
         return True
 
     def _trial(self, h: float, touching: dict[Face, Vec2d]) -> Step:
-        """Return where a step in contact leads.
+        """Return a trial step in contact.
 
-        On a curved surface the particle moves away from the plane half-way, or into it in a hollow,
-        by v_n. It goes out as -v_n (v1/v0)², which keeps it on the circle, and gives the normal
-        impulse of the speed half-way: Chipmunk's restitution, known after a first try. On a face
-        v_n is 0.
+        On a curved surface the particle has a normal velocity v_n at the midpoint (into the surface
+        inside an arc). It leaves with -v_n (v1/v0)², which keeps it on the circle and gives the
+        normal impulse of the speed half-way. This is Chipmunk's restitution, known after a first
+        try. On a flat face v_n is 0.
         """
         middle = self.x + 0.5 * h * self.v
         gaps = {face: face.gap(middle) for face in touching}
@@ -432,7 +436,7 @@ class Lone:
         self.restitution = {}
         for face, (_, n) in gaps.items():
             into, before = self.v.dot(n), min(self.v.dot(touching[face]), 0.0)
-            # In a hollow the overlap at the start of the step is not part of the bend.
+            # Inside an arc the overlap at the start of the step is not due to the curvature.
             bends = into > 0.0 or (into < before and face.hollow(middle) > 0.0)
             self.restitution[face] = 1.0 - max(before / into, 0.0) if bends else 0.0
         contacts = self._rolled(middle - h * self.v, self.v, h, self.pull)
@@ -468,7 +472,7 @@ class Lone:
             normal = contact.normal
             push = contact.push * normal + contact.rub * Vec2d(normal.y, -normal.x)
             if len(end.contacts) == 1:
-                # Round a curved surface its velocity is turned besides.
+                # On a curved surface its velocity is also turned.
                 push = self.body.mass * (end.v - motion[0] - h * self.pull)
             self._bear(contact, end.middle, push, h)
         if self.t > self.tracks.t[0]:
@@ -478,9 +482,9 @@ class Lone:
             self._end("time")
 
     def _lies(self, end: Step, h: float) -> bool:
-        """Tell whether a step without slip changed nothing, on a surface to settle on.
+        """Whether a step without slip changed nothing, on a surface to settle on.
 
-        In a wedge friction may be used up where nothing slips: it is the motion that counts.
+        In a wedge friction may reach its limit without slip, so the motion decides.
         """
         rim = max(self.v.length, self.r * abs(self.omega))
         still = STILL * self.g * h + LEVERS * self.world.hair / self.r * rim
@@ -528,7 +532,7 @@ class Lone:
         self, kind: Kind, surface: int = -1, before: tuple[Vec2d, float] | None = None,
         push: float = 0.0, rub: float = 0.0,
     ) -> None:  # fmt: skip
-        """Write an event; of a blow with its impulses."""
+        """Write an event; an impact with its impulses."""
         v, omega = before or (self.v, self.omega)
         self.recorder.events(
             kind, self.particle, self.t, self.x, self.v, self.omega, velocity_before=v,

@@ -1,10 +1,10 @@
-"""What moves, what is joined, and what rolls with friction: more than Chipmunk's own contacts.
+"""Moving surfaces, joints and rolling friction, in addition to Chipmunk's contacts.
 
-Surfaces that move are kinematic bodies, which are told where; what hangs does so by joints.
+Surfaces with a prescribed motion are kinematic bodies; hinged ones hang on joints.
 
-Strings, rods, springs and pins are joints of a Space. A string takes nothing while it is tight, a
-rod or a pin never, but for the order of the step: what they take is a restitution loss of the
-particles. What a spring gives them is told as their work.
+Strings, rods, springs and pins are joints of a Space. A tight string, a rod or a pin takes energy
+only in the order of the step; this is a restitution loss of the particles. What a spring gives to
+particles is booked as their work.
 """
 
 from __future__ import annotations
@@ -22,19 +22,20 @@ from chutelab.machine import Joint, Machine, Mover
 from chutelab.util.arrays import Bools, Floats, Ints
 
 COMES_BACK: Final = 0.02
-"""s; in which what has gone beyond a stop within a step, or is stretched, is back, but for 1/e."""
+"""s; in this time an angle beyond a stop, or a stretched joint, is brought back to 1/e of its
+error."""
 
 SWEEPS: Final = 10
-"""Iterations of Chipmunk for each face that hangs on a hinge with others: each turns with the first
-one alone, so what strikes one takes as many sweeps as there are faces to reach them all."""
+"""Iterations of Chipmunk per face of a hinged surface. Each face is joined only to the first one,
+so an impact on one takes as many iterations as there are faces to reach them all."""
 
 
 class Hanging:
-    """What hangs on a hinge: a body a face, which pivots there; all of a surface turn together.
+    """A hinged surface: one body per face, pivoted at the hinge; all of them turn together.
 
-    Like a particle's place its angle in the Space is half a step behind, and is read so. Chipmunk
-    tells of a joint's impulse its size only: a stop pushes inwards, and a motor, which drives and
-    brakes, as what else acts and the change of momentum ask for.
+    Like a particle's place its angle in the Space is half a step behind, and is read accordingly.
+    Chipmunk reports only the size of a joint's impulse: a stop pushes inwards; the sign for a
+    motor, which drives or brakes, follows from the change of momentum and the other impulses.
     """
 
     def __init__(self, space: pymunk.Space, mover: Mover, bodies: list[pymunk.Body]) -> None:
@@ -44,7 +45,7 @@ class Hanging:
         x, y = hinge.moment
         pivot, weighs = Vec2d(*mover.pivot), hinge.mass > 0.0
         self.pivot, self.gravity = pivot, space.gravity
-        # What has no weight has its mass at the hinge, where it does nothing.
+        # Without weight the mass is at the hinge, where it has no effect.
         mass = hinge.mass if weighs else hinge.inertia / hinge.gyration**2
         middle = Vec2d(x, y) / mass if weighs else Vec2d.zero()
         space.iterations = max(space.iterations, SWEEPS * many)
@@ -62,7 +63,8 @@ class Hanging:
                 joint.error_bias = 0.0
                 space.add(joint)
         self.stop = pymunk.RotaryLimitJoint(still, self.body, *np.clip(hinge.stops, -1e9, 1e9))
-        # What has gone beyond it comes back slowly: a stop that does so at once throws it back.
+        # An angle beyond a stop is corrected slowly; at once, the stop would throw the surface
+        # back.
         self.stop.error_bias = exp(-1.0 / COMES_BACK)
         self.motor = pymunk.SimpleMotor(self.body, still, hinge.motor[0])
         self.motor.max_force = hinge.motor[1] if mover.begins == 0.0 else 0.0
@@ -73,16 +75,16 @@ class Hanging:
 
     @property
     def rate(self) -> float:
-        """How fast it turns, rad/s."""
+        """Its angular velocity, rad/s."""
         return float(self.body.angular_velocity)
 
     def step(self, t: float, h: float) -> None:
-        """Note its state after a step that ended at a time (s), and what acted on it."""
+        """Note its state after a step that ended at a time (s), and the work done on it."""
         rate, mean = self.rate, 0.5 * (self.rate + self.before)
         inwards = -1.0 if self.body.angle > 0.5 * sum(np.clip(self.hinge.stops, -1e9, 1e9)) else 1.0
         stopped = inwards * self.stop.impulse
         if self.hinge.motor[1] > 0.0:
-            # What weight, spring and contacts gave about the pivot, N m s.
+            # Angular impulse of weight, spring and contacts about the pivot, N m s.
             sprung = self.hinge.spring * (self.hinge.rest - self.body.angle)
             given = [h * (sprung - self.hinge.damper * mean)]
 
@@ -103,13 +105,13 @@ class Hanging:
 
 
 class Moving:
-    """The faces of a world that move; `rows` are theirs among all bodies.
+    """The moving faces of a world; `rows` are their rows among all bodies.
 
-    Of these `center`, (2, bodies), is kept as they go.
+    `center`, (2, bodies), is updated as they move.
 
-    Chipmunk looks for contacts half-way through a step, and gives impulses with the velocities at
-    its end: so a body is placed such that the step takes it to where its surface is half-way, at
-    the velocity that it has at the end.
+    Chipmunk looks for contacts half-way through a step, and solves with the velocities at its end.
+    So a body is placed such that the step moves it to its surface's place half-way, at the
+    surface's velocity at the end.
     """
 
     def __init__(self, machine: Machine, world: World, first: int, center: Floats) -> None:
@@ -122,14 +124,14 @@ class Moving:
                 continue
             if mover.hinge is None:
                 body.body_type = pymunk.Body.KINEMATIC
-            # As written it is here; its shapes are counted from there.
+            # Its place as written; its shapes are relative to it.
             shapes = [shape for shape, its in world.by_shape.items() if its is face]
             links = [shape for shape in shapes if isinstance(shape, pymunk.Segment)]
             self.faces.append((face, body, mover, body.position, links))
             rows.append(row)
         self.rows = np.array(rows, dtype=np.int64)
         self.hanging: dict[int, Hanging] = {}
-        # Bodies that are free would meet each other.
+        # Bodies that are not static would collide with each other.
         for shape in world.by_shape if machine.scene.hinges else ():
             shape.filter = pymunk.ShapeFilter(group=2)
         for surface, mover in movers.items():
@@ -144,7 +146,7 @@ class Moving:
         self.angle, self.center = np.zeros(size), center
 
     def start(self, surface: int, t: float) -> None:
-        """Have a surface begin to move, or its motor, at a time (s)."""
+        """Start the motion of a surface, or its motor, at a time (s)."""
         for k, (face, body, mover, written, links) in enumerate(self.faces):
             if face.surface == surface:
                 self.faces[k] = face, body, replace(mover, begins=t), written, links
@@ -181,14 +183,14 @@ class Moving:
             self._run(face, links, angle)
 
     def _run(self, face: Face, links: list[pymunk.Segment], angle: float) -> None:
-        """Have a belt run along its surface at an angle (rad)."""
+        """Set the direction of a belt whose surface is at an angle (rad)."""
         for link in links if face.speed else ():
             along = (link.b - link.a).normalized().rotated(angle)
             back = -1.0 if face.tangent is None else 1.0
             link.surface_velocity = back * face.speed * along
 
     def swing(self, t: float, h: float) -> None:
-        """Note what hangs on hinges after a step that ended at a time (s)."""
+        """Note the states of hinges after a step that ended at a time (s)."""
         for one in self.hanging.values():
             one.step(t, h)
         for row, (face, body, mover, written, links) in zip(self.rows, self.faces, strict=True):
@@ -200,7 +202,7 @@ class Moving:
             self._run(face, links, body.angle)
 
     def back(self, rows: Ints, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        """Return directions (k,) at bodies, by their rows, as they are where these are at rest."""
+        """Return directions (k,) on bodies (rows), turned back to the bodies' angles as written."""
         c, s = np.cos(self.angle[rows]), np.sin(self.angle[rows])
         return c * x + s * y, c * y - s * x
 
@@ -216,7 +218,7 @@ class Moving:
 
 @dataclass
 class Tie:
-    """A joint of the Space; `over` (m) is what it is stretched by, None before its first step."""
+    """A joint of the Space; `over` (m) is its extension, None before its first step."""
 
     joint: Joint
     held: Any
@@ -225,7 +227,7 @@ class Tie:
     tied: bool = False
 
     def ends(self, positions: Floats) -> tuple[Vec2d, Vec2d]:
-        """Return its far end and its particle's, where particles are at positions (2, N)."""
+        """Return its far end and its particle's end for particles at positions (2, N)."""
         far, own = self.joint.ends(positions.T)
         return Vec2d(*far.tolist()), Vec2d(*own.tolist())
 
@@ -265,7 +267,7 @@ class Ties:
             return rod
 
         def on(i: int) -> Vec2d:
-            """Return where it is pinned as that particle has it, which is released turned."""
+            """Return the pinned place in the frame of a particle, which may be turned."""
             off = np.array(anchor) - machine.releases.position[i]
             return Vec2d(*off.tolist()).rotated(-float(machine.releases.angle[i]))
 
@@ -273,7 +275,7 @@ class Ties:
         return pymunk.PivotJoint(far, own, there, on(joint.particle))
 
     def put(self, i: int, *, free: bool) -> None:
-        """Tie what a particle has, or take it away: what has two is tied once both fly."""
+        """Add or remove the joints of a particle; a joint of two is added once both fly."""
         self.free[i] = free
         for tie in self.all:
             joint = tie.joint
@@ -288,11 +290,11 @@ class Ties:
     def tighten(self, h: float) -> None:
         """Set the lengths of joints for the next step.
 
-        What is tied, or a string that is pulled tight, is by up to a step beyond what it can be.
-        That is taken back slowly: at once it would throw back what hangs on it.
+        A new joint, or a string that is pulled tight, is longer than its length by up to a step's
+        way. That is corrected slowly; at once it would throw the particle back.
 
-        Chipmunk lets a string go that is not longer than its length: one that pulls is kept longer
-        by rounding.
+        Chipmunk releases a string that is not longer than its length, so one that pulls is kept
+        longer by rounding.
         """
         left = exp(-h / COMES_BACK)
         for tie in self.all:
@@ -324,7 +326,7 @@ class Ties:
                     held.max = min(held.max, length - rounding)
 
     def pulled(self, state: Floats, pull: Vec2d, h: float) -> list[tuple[Tie, Floats]]:
-        """Return what each joint did in the last step to the ledger: entries of the particles, J.
+        """Return the effect of each joint on the ledger in the last step: entries of particles, J.
 
         `state` (2, 5, N) is that before and after it: x, y, vx, vy and angular velocity; `pull` is
         gravity.
@@ -336,7 +338,7 @@ class Ties:
             joint, own = tie.joint, state[..., tie.joint.particle]
             far = state[..., joint.other] if joint.other >= 0 else np.zeros((2, 5))
             mean, entries = 0.5 * (own + far * -1.0).sum(axis=0)[2:4], np.zeros(3)
-            # Where the bodies stand is where the joint acts.
+            # The joint acts at the places of the bodies in the Space.
             held = tie.held
             middle = (held.anchor_a if joint.other < 0 else held.a.position) - held.b.position
             towards = np.array(middle.normalized())
@@ -363,20 +365,20 @@ class Ties:
 class Rolling:
     """Couples of rolling friction between rows of bodies: two (k,) of rows, and N m s.
 
-    They are given before a step, so that friction bears them, and grow from step to step until
-    nothing turns, up to what the pushes of the step before allow.
+    They are applied before a step, so that friction balances them, and grow from step to step until
+    the rotation stops, up to what the normal impulses of the step before allow.
 
     Parameters
     ----------
     machine : Machine
     radius : ndarray, (rows,)
-        Of particles, then of faces, 0, m.
+        Radii of particles, then 0 for faces, m.
     """
 
     def __init__(self, machine: Machine, radius: Floats) -> None:
         self.count = machine.count
-        # Of particles that turn: 1/I, and rolling friction's arm over the radius, if any has it;
-        # and of what is round 1 over the radius.
+        # Of particles that rotate: 1/I, the arm of rolling friction over the radius, if any has it;
+        # of round ones also 1 over the radius.
         self.ease, self.arm, self.bend = np.zeros((3, len(radius)))
         outlines = [machine.outlines[kind] for kind in machine.releases.kind]
         is_round = [outline is None for outline in outlines]
@@ -388,7 +390,7 @@ class Rolling:
         self.couples: tuple[Any, ...] = (*np.zeros((2, 0), dtype=np.int64), np.zeros(0))
 
     def turn(self, bodies: list[tuple[pymunk.Body, pymunk.Shape]], free: Bools) -> None:
-        """Give the couples to those whose contacts of the last step last."""
+        """Apply the couples at contacts that last from the step before."""
         one, other, couple = self.couples
         kept = free[one] & ((other >= self.count) | free[np.minimum(other, self.count - 1)])
         one, other, couple = self.couples = one[kept], other[kept], couple[kept]
@@ -399,7 +401,7 @@ class Rolling:
             bodies[i][0].angular_velocity += float(turned[i])
 
     def book(self, entries: Floats, turning: Floats, spin: Floats) -> float:
-        """Add what the couples of a step do to entries, (3, rows); return heat of particles, J.
+        """Add the work of a step's couples to entries, (3, rows); return the heat of particles, J.
 
         `turning` is ω before and after it, (2, rows), less the `spin` of surfaces.
         """
@@ -412,13 +414,14 @@ class Rolling:
         return float(heat[pair].sum())
 
     def brake(self, one: Ints, other: Ints, push: Floats, turning: Floats) -> None:
-        """Find the couples of the next step from the pushes (k,) of this one."""
+        """Find the couples of the next step from the normal impulses (k,) of this one."""
         rows, (last, mate, couple) = len(self.bend), self.couples
         before = dict(
             zip(zip(last.tolist(), mate.tolist(), strict=True), couple.tolist(), strict=True)
         )
         held = [before.get(key, 0.0) for key in zip(one.tolist(), other.tolist(), strict=True)]
-        # Of two kinds the larger; between two disks on the radius of both together. Edges are flat.
+        # The larger coefficient of two kinds counts; between two disks with their common radius.
+        # Edges are flat.
         share = np.maximum(self.arm[one], self.arm[other])
         bends = self.bend[one] + self.bend[other]
         most = np.divide(share * push, bends, out=np.zeros(len(one)), where=bends > 0.0)

@@ -1,4 +1,4 @@
-"""All bodies and shapes of a machine in one Space, and what Chipmunk is told at a contact."""
+"""All bodies and shapes of a machine in one Space, and the values of contacts for Chipmunk."""
 
 from __future__ import annotations
 
@@ -15,34 +15,35 @@ from chutelab.machine import Machine
 from chutelab.util.arrays import Floats
 
 SLOP, BIAS = 1e-3, 1e-97
-"""Overlap that Chipmunk leaves alone, as a share of the radius, and the share of what is beyond it
-that it leaves after 1 s: it takes back a fifth in 1 ms. Its defaults are meant for pixels and 60
-steps a second: 0.1 (m here) and 0.9^60, 0.6 % in 1 ms. With those, disks that land without a
-rebound, a step late, stay where they sank: in `stream` at 1 ms 1 % of all contacts overlap by
-46 % of the radius, with these by 1.4 %. The residual is 3e-4 either way, as all of it is pushed out
-at last: that work is no contact's impulse, and the ledger shows it as residual. Without any slop
-disks that lie still lose contact every few steps."""
+"""Overlap that Chipmunk tolerates, as a share of the radius, and the share of the rest that is left
+after 1 s: a fifth is removed in 1 ms. Its defaults are meant for pixels and 60 steps a second: 0.1
+(m here) and 0.9^60, 0.6 % in 1 ms. With those, disks that land without a rebound, detected a step
+late, stay where they sank: in `stream` at 1 ms, 1 % of all contacts overlap by 46 % of the radius,
+with these values by 1.4 %. The residual is 3e-4 either way, as all overlaps are removed in the end:
+that work belongs to no contact's impulse, so it is in the residual. Without slop, disks at rest
+lose contact every few steps."""
 
 ROUND = 3e-3
-"""Share of its smallest half-width by which a polygon's corners are rounded: `SLOP` and more. How
-two faces lie on each other Chipmunk tells from a distance above 0 between what is not rounded; at
-0 its normal may be anything."""
+"""Share of its smallest half-width by which a polygon's corners are rounded, more than `SLOP`.
+Chipmunk finds the normal of two faces from a positive distance of the unrounded shapes; at 0 it is
+undefined."""
 
 FACES, JOINED = 30, 100
-"""Iterations of Chipmunk's solver where particles have corners: the two points of a face share
-a blow to 1e-11. Its default, 10, which is right for disks, leaves 1e-4. A blow between two on pins
-is right to 1e-2 by 30, to rounding by 100."""
+"""Iterations of Chipmunk's solver for particles with corners, and with joints. The two points of a
+face then share an impact to 1e-11; the default of 10, which is right for disks, leaves 1e-4. An
+impact of two bodies on pins is right to 1e-2 with 30, and to rounding with 100."""
 
 ROLLER = 3
 """Collision type of the ends of moving segments."""
 
 SMALLEST = 1e-12
-"""Pair value that stands for 0 where Chipmunk's product of two shapes' values is divided by it."""
+"""Stands for a pair value of 0, because Chipmunk's product of two shapes' values is divided by
+it."""
 
 SAGITTA = 1e-5
-"""Share of the smallest radius r by which a chain of segments is off the arc of radius R that it
-stands for. Its links turn by δ = 2 √(2 SAGITTA r/R); without restitution a disk that slides in a
-hollow loses δ/4 of its speed for each rad that it turns: 0.03 % where R is 50 r."""
+"""Distance of a chain of segments from its arc of radius R, as a share of the smallest radius r.
+Its links turn by δ = 2 √(2 SAGITTA r/R); without restitution a disk that slides inside the arc
+loses δ/4 of its speed per rad: 0.03 % if R is 50 r."""
 
 
 class Shapes:
@@ -53,17 +54,17 @@ class Shapes:
     smallest : float
         Radius of the smallest particle, or a polygon's smallest half-width, m.
     corners : bool
-        Whether some particles are no disks.
+        Whether some particles are not disks.
     bodies : list
         Body and shape of each particle.
     rank : dict
         Row of each body, by its id: particles, then faces.
     gates : dict
-        Shapes of the surfaces that are not always there.
+        Shapes of the surfaces that do not always exist.
     points : list
-        If there are corners, what was done at each point of each contact in the last step: rows of
-        bodies A and B, whether they met now, impulse on A (N s), normal from A to B, and the levers
-        of A and B (m), each x and y.
+        If there are corners, each point of each contact in the last step: rows of bodies A and B,
+        whether the contact is new, impulse on A (N s), normal from A to B, and the levers of A and
+        B (m), each x and y.
     """
 
     def __init__(self, machine: Machine, world: World) -> None:
@@ -77,20 +78,21 @@ class Shapes:
         self.corners = any(outline is not None for outline in m.outlines)
         space.gravity, space.collision_bias = Vec2d(*(-m.gravity * m.up)), BIAS
         space.collision_slop = SLOP * self.smallest + world.hair
-        # What Chipmunk remembers longer it reports in the impulse when two meet again, unapplied.
+        # If Chipmunk remembered contacts longer, it would report old impulses, not applied, when
+        # two meet again.
         space.collision_persistence = 1
-        # All are made now, so that none gets the id of one that is gone.
+        # All are made now, so that none gets the id of a deleted one.
         self.bodies = [self._body(i) for i in range(m.count)]
         shapes = (shape for _, shape in self.bodies)
         self.kind = dict(zip(shapes, m.releases.kind.tolist(), strict=True))
         self._pairs()
-        # Ends of belts, with the direction in which they are out of them.
+        # Ends of belts, with the direction outward.
         self.out: dict[pymunk.Shape, Vec2d] = {}
         self.gates: dict[Face, list[pymunk.Shape]] = {}
-        # Gates that are there, and particles that a gate shut on, with the gate.
+        # Gates that exist now; particles on which a gate closed, with the gate.
         self.up, self.shut = set[Face](), set[tuple[pymunk.Shape, Face]]()
-        # Chains of faces that are solid from one side. Of each particle that touches one, how many
-        # of their shapes, and whether it came from the side that lets it through.
+        # Chains of faces that are solid from one side. For each particle that touches one: the
+        # number of shapes touched, and whether it came from the side that lets it through.
         self.chains = self._one_sided()
         self.touching: dict[tuple[pymunk.Shape, tuple[Face, ...]], tuple[int, bool]] = {}
         waits = {one.surface for one in machine.triggers if one.doing != "starts"}
@@ -132,7 +134,7 @@ class Shapes:
             body.angle = float(self.machine.releases.angle[i])
             width, out = self._faces(outline)
             by = ROUND * width
-            # Corners of the polygon whose faces are further in by as much as it is rounded.
+            # Corners of the polygon with its faces moved in by the rounding.
             back = np.roll(out, 1, axis=0)
             share = 1.0 + (out * back).sum(axis=1, keepdims=True)
             inner = outline - by * (out + back) / share
@@ -141,7 +143,7 @@ class Shapes:
         if not self.machine.interact:
             shape.filter = pymunk.ShapeFilter(group=1)
         elif (self.machine.pair_restitution < 0.0).any():
-            # Bit 0 is of all kinds that meet every other, and of surfaces like all bits.
+            # Bit 0 belongs to all kinds that meet every other kind; surfaces have all bits.
             through = self.machine.pair_restitution < 0.0
             bits = {kind: n for n, kind in enumerate(np.flatnonzero(through.any(axis=0)), 1)}
             kind = self.machine.releases.kind[i]
@@ -162,9 +164,9 @@ class Shapes:
         return float(np.abs(distance).min()), out
 
     def _pairs(self) -> None:
-        """Give particles values of which Chipmunk's products are those of pairs.
+        """Give particles values whose products by Chipmunk are the values of pairs.
 
-        Where none are, pairs have theirs from `table`, (2, K, K + F), at each contact.
+        If there are none such, each contact gets the pair's values from `table`, (2, K, K + F).
         """
         m, kinds = self.machine, self.machine.releases.kind
         values = np.array([m.pair_restitution.clip(0.0), np.minimum(m.pair_friction, GRIP)])
@@ -189,7 +191,7 @@ class Shapes:
         assert shape.body is not None
         if isinstance(face, Bend):
             assert face.foot.body is not None
-            # Chipmunk frees the body with it: nothing may touch that shape again.
+            # Chipmunk frees the body with its shape, which must not be used again.
             del self.world.by_shape[face.foot]
             space.remove(face.foot, face.foot.body)
             return self._chain(face)
@@ -206,8 +208,8 @@ class Shapes:
         if face.speed == 0.0:
             return [shape]
         if not self.corners:
-            # With neighbours in line Chipmunk finds no contact beyond the segment's ends, nor of
-            # what lies flat on one by an edge, as rounding will have it.
+            # With neighbours in line Chipmunk finds no contact beyond the segment's ends, nor,
+            # depending on rounding, of an edge that lies flat on the segment.
             a, b = face.ends
             shape.set_neighbors(a - (b - a), b + (b - a))
         assert face.tangent is not None
@@ -219,7 +221,7 @@ class Shapes:
         return [shape, *rollers]
 
     def _chain(self, face: Bend) -> list[pymunk.Shape]:
-        """Return what stands for an arc, or for a whole circle: that itself if all are outside."""
+        """Return the shapes for an arc: a circle if it is one and all are outside."""
         body, circle = face.shape.body, face.shape
         assert body is not None
         assert isinstance(circle, pymunk.Circle)
@@ -234,7 +236,7 @@ class Shapes:
             begin, begin + extent, max(ceil(extent / (2.0 * acos(1.0 - bow))), 3) + 1
         )
         points = [Vec2d.from_polar(circle.radius, angle) for angle in angles.tolist()]
-        # A belt goes on in line at both ends, where rollers are met; what stands still ends there.
+        # A belt continues straight at both ends, where its rollers are met; a fixed arc ends there.
         a, b = points[0], points[-1]
         if face.extent == inf:
             before, after = points[-2], points[1]
@@ -251,10 +253,11 @@ class Shapes:
         return chain
 
     def _met(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
-        """Give a contact what its shapes do not have: of two particles the values of their kinds.
+        """Set the values of a contact that its shapes lack: of two kinds of particles.
 
-        The end of a belt moves along its rim, and beside the face it is not met; nor does a gate
-        touch a particle that it shut on, or what is solid from one side one that it lets through.
+        The end of a belt moves along its rim, and is not met beside the face. A gate does not touch
+        a particle on which it closed, nor a surface that is solid from one side a particle that it
+        lets through.
         """
         shape, met = arbiter.shapes
         face = self.world.by_shape.get(met)
@@ -277,7 +280,7 @@ class Shapes:
             arbiter.restitution, arbiter.friction = pair.tolist()
 
     def _one_sided(self) -> dict[Face | None, tuple[Face, ...]]:
-        """Return the chain of each face that is solid from one side: those that follow each other.
+        """Return the chain of each face that is solid from one side: faces that follow each other.
 
         The ends of an arc follow it.
         """
@@ -294,7 +297,7 @@ class Shapes:
     def _comes(self, arbiter: pymunk.Arbiter, space: pymunk.Space, _data: Any) -> None:
         """Note from which side of a chain a particle comes that touches the first of its shapes.
 
-        It is where it was a step ago: as far as its radius it may have come since.
+        Its place of a step ago counts: it may have moved by up to its radius since.
         """
         shape, met = arbiter.shapes
         if (chain := self.chains.get(self.world.by_shape[met])) is None:
@@ -305,13 +308,13 @@ class Shapes:
             x = shape.body.position - space.current_time_step * shape.body.velocity
             gaps = [(face.gap(x)[0], face.side(x)) for face in chain]
             least = min(gap for gap, _ in gaps) + self.world.hair
-            # At a corner, where two are as near, the sum of their normals counts.
+            # At a corner, where two faces are equally near, the sum of their normals counts.
             passes = sum(side for gap, side in gaps if gap <= least) < 0.0
         self.touching[shape, chain] = count + 1, passes
 
     def _goes(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
-        """Note that a particle touches a shape no more; clear of a chain, it is spared no more."""
-        # As its Space goes the two may come the other way round.
+        """Note that a particle no longer touches a shape; clear of a chain, it meets it again."""
+        # When its Space is deleted, the two may come in the other order.
         shape, met = sorted(arbiter.shapes, key=self.world.by_shape.__contains__)
         chain = self.chains.get(self.world.by_shape[met], ())
         count, passes = self.touching.pop((shape, chain), (0, False))
@@ -319,7 +322,7 @@ class Shapes:
             self.touching[shape, chain] = count - 1, passes
 
     def _note(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
-        """Note what was done at each point of a contact; what Pymunk tells itself are sums."""
+        """Note the impulse at each point of a contact; Pymunk itself reports only sums."""
         raw = arbiter._arbiter
         a, b = reversed(arbiter.bodies) if raw.swapped else arbiter.bodies
         rows, first, n = (self.rank[a.id], self.rank[b.id]), arbiter.is_first_contact, raw.n
@@ -329,7 +332,7 @@ class Shapes:
             self.points.append((*rows, first, -jx, -jy, n.x, n.y, c.r1.x, c.r1.y, c.r2.x, c.r2.y))
 
     def open_and_shut(self, now: float) -> None:
-        """Put in gates that are there at a time (s), take out others; note what they shut on."""
+        """Add gates that exist at a time (s), remove others; note particles on which they close."""
         space = self.world.space
         for face, shapes in self.gates.items():
             if (face.appears <= now < face.vanishes) == (face in self.up):
@@ -351,7 +354,7 @@ class Shapes:
         return {shape for shape in hits if shape is not None and shape.collision_type == PARTICLE}
 
     def taken(self, i: int, place: Vec2d, by: int) -> bool:
-        """Tell whether a particle that is not in the Space yet would overlap something there.
+        """Whether a particle that is not in the Space yet would overlap something there.
 
         Another one, or a surface that moves: `by` is their collision type.
         """

@@ -1,20 +1,20 @@
 """All particles in one Space, stepped by `run.dt`: Pymunk as it is.
 
-Chipmunk moves first and then changes velocities, so bodies in the Space stand half a step ahead of
-their velocities: with x the place at the velocity's time, the Space holds x - v h/2. Read so, free
-flight is exact, and gravity's work is. Contacts are seen up to a step late, at an overlap of up to
-v dt: keep v dt below the radius, or disks pass through surfaces.
+Chipmunk moves bodies first and then changes velocities. So positions in the Space belong to a time
+half a step before that of the velocities: with x the place at the velocity's time, the Space holds
+x - v h/2. Read this way, free flight and the work of gravity are exact. Contacts are seen up to a
+step late, at an overlap of up to v dt: keep v dt below the radius, or disks pass through surfaces.
 
 Releases, separations of carried particles and exits have their own times, contacts that of their
-step's end. A ride that friction drives hops, ever longer towards its end, which is put where the
-surface pushed last. A disk rises from a rim like a t³/6, with a some 50 m/s³, so a place that is
-off by δ shifts the last push by (6 δ/a)^(1/3): in `slip` it is 21, 12, 5 and 4 ms early at 2, 1,
-0.5 and 0.25 ms, and no less at shorter steps, as `SLOP`, 4 µm there, stays.
+step's end. A ride that friction drives hops, longer and longer towards its end; the end is taken to
+be at the surface's last push. A disk rises from a rim like a t³/6, with a some 50 m/s³, so a place
+that is off by δ shifts the last push by (6 δ/a)^(1/3): in `slip` it is 21, 12, 5 and 4 ms early at
+2, 1, 0.5 and 0.25 ms, and no less at shorter steps, as `SLOP`, 4 µm there, stays.
 
-A pendulum's string keeps its length to v² h²/(2 L), and its period is of order 2. A string takes
-nothing while it is tight; what a jerk takes is a restitution loss of the particles. Balls that hang
-side by side hand a blow on one by one only if there are gaps between them, of 1e-4 r or more:
-contacts that touch Chipmunk solves all at once, and all balls move.
+A pendulum's string keeps its length to v² h²/(2 L), and its period is of order 2. A tight string
+takes no energy; the loss in a jerk is a restitution loss of the particles. Balls that hang side by
+side pass an impact on one by one only if there are gaps of 1e-4 r or more between them: Chipmunk
+solves contacts that touch all at once, and all balls move.
 """
 
 from __future__ import annotations
@@ -36,17 +36,18 @@ from chutelab.results.recorder import EnoughError, Recorder, Tracks
 from chutelab.util.arrays import Floats, Ints, Progress
 
 SOON = 1e-9
-"""Share of a step that a time may be ahead and count as now."""
+"""A time ahead by up to this share of a step counts as now."""
 
 TOUCHING = 1e-9
 """Radii by which disks that just touch may overlap when they are released."""
 
 STAY, HOP = 5, 50
-"""Pushes of one surface that make a ride, and steps without one that end it. A grip of large
-friction hops for some steps at a time; the ride ends with its last push."""
+"""Number of pushes of one surface that make a ride, and of steps without a push that end it. With
+large friction a ride hops for some steps at a time; it ends with the last push."""
 
 CALM, STILL = 0.1, 1e-3
-"""s over `Machine.pace`, and m/s times that: slower for that long, a particle has settled."""
+"""s divided by `Machine.pace`, and m/s times it: a particle that is slower for so long has
+settled."""
 
 VISCOSITY = 1.8e-5
 """Pa s; of air at 20 °C."""
@@ -66,14 +67,14 @@ _ARBITER = (
 )
 
 TOWARDS = np.array([[1.0], [1.0], [-1.0], [-1.0]])
-"""Turns Chipmunk's normal, but not its impulse."""
+"""Direction of Chipmunk's normal, but not of its impulse."""
 
 
 class Shared:
     """Runs all particles together.
 
     `state` is (2, 5, N + F): before and after the last step; x, y, vx, vy, ω; of N particles, then
-    of F faces, which have motion 0: a belt's speed is counted apart. `entries` is (3, N + F).
+    of F faces, whose motion is 0 (belt speeds are separate). `entries` is (3, N + F).
 
     Parameters
     ----------
@@ -90,18 +91,18 @@ class Shared:
         self.radius[:count], self.broad = p.radius, machine.broad
         self.shapes = Shapes(machine, world)
         self.bodies, self.corners = self.shapes.bodies, self.shapes.corners
-        # The same for all, or each one's own.
+        # One value for all, or one each.
         self.r: Any = p.radius if not np.ndim(p.radius) else self.radius
         self.alike = len(machine.pair_restitution) == 1 and not np.ndim(p.radius)
         self.tracks = Tracks(recorder, self.shapes.smallest, range(count), turning=self.corners)
-        # How far each has turned, where that is seen.
+        # Angle of each, if some are not round.
         self.fields = _BODY | batch.BodyFields.ANGLE if self.corners else _BODY
         self.angle = np.zeros(rows) if self.corners else None
         self.g, pace = machine.gravity, world.pace
         self.lasts, self.still = CALM / pace, STILL * pace
         self.last_gate = machine.last_gate
         self.pull = Vec2d(*(-self.g * machine.up))
-        # A whole number of steps ends the run.
+        # The run ends after a whole number of steps.
         self.t = self.begin = float(starts.t.min())
         if any(mover.hinge for mover in machine.movers):
             self.t = self.begin = min(self.begin, 0.0)
@@ -123,7 +124,7 @@ class Shared:
         about += [(face.surface, face.speed, *(face.tangent or (0.0, 0.0))) for face in faces]
         surface, self.speed, self.tx, self.ty = np.array(about).T
         self.surface = surface.astype(np.int64)
-        # Of all rows at the first end and at the last, x and y.
+        # Directions of all rows at the first end and at the last, x and y.
         self.crowns = np.array([NONE] * count + [face.crowns for face in faces])
         self.throws = (self.speed != 0.0) & (self.surface != machine.landing)
         self.spin = np.zeros(rows)
@@ -142,7 +143,7 @@ class Shared:
             self.spin += self.moving.turn[1]
         self.rolling = Rolling(machine, self.radius)
         self.ties = Ties(machine, world, [body for body, _ in self.bodies[:count]])
-        # Rows by sorted id of the bodies; the Space's own body, of surfaces, is no particle.
+        # Rows by sorted id of the bodies; the Space's static body belongs to surfaces.
         self.surfaces_body = world.space.static_body.id
         self.buffer, ids = batch.Buffer(), np.array(list(self.shapes.rank), dtype=np.uintp)
         self.row = ids.argsort()
@@ -151,7 +152,7 @@ class Shared:
     def run(self, report: Progress) -> None:
         """Run to the end."""
         reason, enough = "time", None
-        # What hangs swings on to a time that is given.
+        # With hinges, a run to a given time goes on to that time.
         on = bool(self.moving and self.moving.hanging) and self.machine.until == "time"
         while self.clock < self.most and (on or self.waiting or self.inside.any()):
             if not self.inside.any() and not (self.moving and self.moving.hanging):
@@ -210,16 +211,16 @@ class Shared:
                 body.body_type = pymunk.Body.KINEMATIC
                 body.position, body.velocity = ride.at(self.t - 0.5 * self.h - t)
                 self.state[1, :2, i], self.state[1, 2:4, i] = ride.at(self.t - t)
-                # A belt that stands holds it for good.
+                # A belt at rest holds it for good.
                 self.calm[i] = -inf if ride.speed else inf
             else:
                 self._free(i, t, x, v, omega)
             if self.corners:
-                # Chipmunk looks for it where it was as it was added, up to the next step.
+                # Up to the next step Chipmunk looks for it at the place where it was added.
                 self.world.space.reindex_shapes_for_body(body)
 
     def _taken(self, i: int, x: Vec2d, v: Vec2d, late: float) -> bool:
-        """Tell whether the place where a particle starts is taken, now or when it was due."""
+        """Whether the place where a particle starts is taken, now or when it was due."""
         kinds = self.machine.releases.kind
         others = np.flatnonzero(self.inside & (self.machine.pair_restitution[kinds[i]][kinds] >= 0))
         if not len(others):
@@ -250,7 +251,7 @@ class Shared:
         self.ties.put(i, free=True)
 
     def _ride(self) -> None:
-        """Steer carried particles round the pulley in this step; let go those at its end."""
+        """Steer carried particles round the pulley in this step; release those at its end."""
         ahead = self.t + 0.5 * self.h
         for i, ride in list(self.rides.items()):
             body, shape = self.bodies[i]
@@ -261,7 +262,7 @@ class Shared:
                     Kind.SEPARATION, i, ride.until, tuple(x), tuple(v), surface=ride.surface
                 )
                 del self.rides[i]
-                # A body that is put in anew meets what it touches for the first time.
+                # A body that is added again makes new contacts with what it touches.
                 self.world.space.remove(body, shape)
                 body.body_type = pymunk.Body.DYNAMIC
                 body.mass, body.moment = self.world.heft(i)
@@ -302,7 +303,7 @@ class Shared:
         told = np.frombuffer(self.buffer.float_buf()).reshape(len(ids), -1)[known].T
         turned = self.angle
         if turned is not None:
-            # Like its place a body's angle, which comes third, is half a step behind.
+            # Like its place, a body's angle (third) is half a step behind.
             self.angle = turned.copy()
             self.angle[rows] = told[2] + (0.5 * self.h) * told[5]
             told = told[[0, 1, 3, 4, 5]]
@@ -325,7 +326,7 @@ class Shared:
         self._endings(t, entries)
 
     def _touched(self, surfaces: set[int]) -> None:
-        """Have what waits for a touch do what it is to do, after a step in which these were."""
+        """Run the triggers of surfaces that were touched in a step."""
         for k, (surface, doing, by) in enumerate(self.machine.triggers):
             if by not in surfaces or self.recorder.triggered[k] < inf:
                 continue
@@ -339,7 +340,7 @@ class Shared:
                     object.__setattr__(face, clock, self.t)
 
     def _contacts(self) -> None:
-        """Book what pushes, and tell blows, landings and which particle rides what."""
+        """Book contacts; record impacts, landings and which particle rides which surface."""
         a, b, first, values = self._touches()
         # The impulse acts on A, the normal points from A to B.
         push = -values[0] * values[2] - values[1] * values[3]
@@ -351,7 +352,7 @@ class Shared:
             return
         one, other = np.minimum(a, b), np.maximum(a, b)
         if len(order) > 1:
-            # They come in the order of a hash of addresses, on which no sum may depend.
+            # Sort them: they come in the order of a hash of addresses, on which no sum may depend.
             keys = (*values[4:], push, other, one)
             order = order[np.lexsort([key.take(order) for key in keys])]
         a, one, other, push, first = (part.take(order) for part in (a, one, other, push, first))
@@ -359,7 +360,7 @@ class Shared:
         jx, jy, nx, ny = np.where(straight, 1.0, -1.0) * values[:4] * TOWARDS
         rub = jx * ny - jy * nx
         speed = self.speed[other]
-        # As surfaces are written.
+        # The normal in the frame of the surface as written.
         bx, by = (nx, ny) if self.moving is None else self.moving.back(other, nx, ny)
         last = (self.tx[other] * bx + self.ty[other] * by > 0.0).astype(int)
         crown = self.crowns[other, last].T
@@ -368,7 +369,7 @@ class Shared:
             away = self.state[1, :2].take(one, axis=1) - self.center.take(other, axis=1)
             side = np.where(self.bent[other], away[0] * nx + away[1] * ny, side)
         belt = np.where(side < 0.0, -speed, speed)
-        # Of the contact points to each other, before and after: (2, k).
+        # Relative velocities of the contact points, before and after: (2, k).
         mine, others = (self.state[:, 2:].take(row, axis=2) for row in (one, other))
         arms = -self.radius[one] * np.stack((nx, ny))
         if self.corners:
@@ -379,7 +380,7 @@ class Shared:
         rate = u * nx + v * ny
         slip = u * ny - v * nx
         if self.corners:
-            # r × n turns into the rate.
+            # The relative velocity from spin: r × n times ω.
             for (x, y), spin in ((arms[:2], mine[:, 2]), (arms[2:], -others[:, 2])):
                 rate = rate + spin * (x * ny - y * nx)
                 slip = slip - spin * (x * nx + y * ny)
@@ -388,7 +389,7 @@ class Shared:
         else:
             slip = slip + self.r * (mine[:, 2] + others[:, 2])
         slip = slip - belt
-        # J (u before + u after)/2; then whether the contact is still, and that it is one.
+        # J (u before + u after)/2; then whether the contact is at rest, and a 1 to count contacts.
         sums = np.ones((5, len(one)))
         sums[0], sums[1] = rub * belt + work, -0.5 * push * (rate[0] + rate[1])
         sums[2] = -0.5 * rub * (slip[0] + slip[1])
@@ -430,13 +431,13 @@ class Shared:
         self._riding(one[~pair], surface[~pair])
         lands = (surface == self.machine.landing) & ~self.landed[one]
         if self.bends:
-            # From one link of a chain to the next is no blow.
+            # Going from one link of a chain to the next is not an impact.
             contact = one * rows + other
             first &= np.append(self.before, -1)[self.before.searchsorted(contact)] != contact
             self.before = contact  # sorted, as `order` has them
         told = np.flatnonzero(lands | first & (rate[0] < -self.g * self.h))
         if self.corners and len(told):
-            # Of all points of a contact one event.
+            # One event for all points of a contact.
             _, which = np.unique(one * rows + other, return_inverse=True)
             push, rub = (np.bincount(which, part)[which] for part in (push, rub))
             told = told[np.unique(which[told], return_index=True)[1]]
@@ -453,7 +454,7 @@ class Shared:
             )  # fmt: skip
 
     def _slow_down(self) -> None:
-        """Have air slow all that are free down for half a step, as spheres; book what it takes."""
+        """Apply half a step of air drag to all free particles, as spheres; book the loss."""
         air, p, r = self.machine.air, self.machine.particle, self.broad
 
         def relief(speed: Floats) -> Any:
@@ -474,7 +475,7 @@ class Shared:
         self.recorder.air_loss += float(lost.sum())
 
     def _carry(self, one: Ints, other: Ints, arms: Floats, push: Floats, others: Floats) -> Any:
-        """Have surfaces that move do so in `others`, (2, 3, k); book and return their work, J."""
+        """Put the motion of surfaces into `others`, (2, 3, k); book and return their work, J."""
         if self.moving is None:
             return 0.0
         place = 0.5 * (self.state[0, :2] + self.state[1, :2]).take(one, axis=1)
@@ -485,7 +486,7 @@ class Shared:
         return work
 
     def _bear(self, bins: Bins, one: Ints, other: Ints, push: Any, normal: Any, arms: Any) -> None:
-        """Count this step's impulses on surfaces, and on belts by what rides them, as loads."""
+        """Count this step's impulses on surfaces, and of carried particles, as loads."""
         begin, end = self.t - self.h, self.t
         middle = 0.5 * (self.state[0, :2] + self.state[1, :2])
         alone = other >= self.count
@@ -505,7 +506,7 @@ class Shared:
                     bins.bear(ride.surface, begin, end, below, up, pushed)
 
     def _touches(self) -> tuple[Any, ...]:
-        """Return both bodies' rows, whether they met now, and impulse on A, normal and levers."""
+        """Return rows of both bodies, whether they are new, impulse on A, normal, levers."""
         if self.corners:
             points = np.array(self.shapes.points).reshape(-1, 11).T
             self.shapes.points.clear()
@@ -518,7 +519,7 @@ class Shared:
         return *self.row[self.ids.searchsorted(ids[:2])], ids[2] != 0, values
 
     def _riding(self, particles: Ints, surface: Ints) -> None:
-        """Count pushes of surfaces in a row; tell separations at the last one's time."""
+        """Count consecutive pushes of surfaces; record separations at the time of the last one."""
         if not len(particles) and not self.pushes.any():
             return
         over = self.left[0] < self.t - HOP * self.h
@@ -543,7 +544,7 @@ class Shared:
             v = Vec2d(*self.state[0, 2:4, i].tolist())
             late = Flight(begin, v, self.pull).leaves(self.machine.releases.exit_box[i])
             if late < self.h and (entries[:, i] == self.entries[:, i]).all():
-                # It flew, and left within the step.
+                # It was in flight, and left within the step.
                 after = v + late * self.pull
                 self.state[1, :4, i] = *(begin + 0.5 * late * (v + after)), *after
             else:
@@ -553,7 +554,7 @@ class Shared:
             for i in np.flatnonzero(self.landed & self.free).tolist():
                 self._end(i, "landed")
         calm = self.inside & (self.calm >= self.lasts)
-        # Nothing counts as settled before the last gate has opened or closed, or just after.
+        # Nothing counts as settled before, or just after, the last gate has opened or closed.
         gated = self.t < self.last_gate + self.lasts
         under_way = gated or bool(self.waiting) or bool((self.inside & ~calm).any())
         together = self.machine.interact and under_way
@@ -564,7 +565,7 @@ class Shared:
                 self._end(i, "settled", self.t, Kind.SETTLE)
 
     def _tell_calm(self, i: int) -> None:
-        """Tell since when a particle lies calm, if it does: since the end of that step."""
+        """Record that a particle is at rest, if it is: from the end of that step on."""
         if i not in self.rides and self.calm[i] >= self.lasts:
             late, place, speed = self.calm[i] - self.h, *self.state[1, :4, i].reshape(2, 2)
             self.recorder.events(

@@ -1,16 +1,16 @@
-"""A lone particle as an ordinary differential equation: an answer that shares no formula with ours.
+"""A lone particle as an ordinary differential equation: an independent answer.
 
 SciPy's DOP853 integrates flight, adhesion ride, sliding and rolling, one phase after the other. A
 phase ends where a gap closes or a force changes its sign: each step's dense output is sampled, and
-the root is found between two samples by Brent's method. What happens there (Newton restitution,
-Coulomb friction) is written out here once more. Of Chutelab it takes the machine's arrays, and
-hands back a `Recording`; needs SciPy.
+the root is found between two samples by Brent's method. Newton's restitution and Coulomb's friction
+are written here again. It shares only the machine's arrays and the `Recording` with the rest of
+Chutelab; it needs SciPy.
 
-`solve_ivp` has events of its own, and cannot serve: it looks at them at the ends of its steps only,
-which are as long as a flight here, and takes no longest step that depends on the speed.
+The events of `solve_ivp` do not suffice: it checks them only at the ends of its steps, which are as
+long as a flight here, and it has no maximum step that depends on the speed.
 
-What it can miss: a contact that begins and ends between two samples, less than `PIECE` apart; what
-it cannot follow (rest in a corner, more than `MOST_PHASES` contacts) is refused.
+It can miss a contact that begins and ends between two samples, less than `PIECE` apart. It refuses
+what it cannot follow: rest in a corner, more than `MOST_PHASES` contacts.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ RTOL, ATOL = 1e-13, 1e-15
 """Relative and absolute (SI) tolerance of a step: a little above what DOP853 accepts."""
 
 PIECES = 16
-"""Samples of a step, in which gaps are looked at."""
+"""Samples of a step at which gaps are checked."""
 
 PIECE = 0.003
 """m between two samples, or the radius where that is more."""
@@ -42,18 +42,18 @@ ARC = 0.05
 """rad; longest step round a circle, so that the dense output of order 7 is good to 1e-15."""
 
 TOUCH = 1e-12
-"""m; surfaces this near are touched. Positions are good to some 1e-15 m."""
+"""m; nearer surfaces are touched. Positions are accurate to some 1e-15 m."""
 
 REST = 1e-12
-"""m/s; a rebound slower than this is none. What is left of the bounces then lasts some 1e-13 s."""
+"""m/s; a slower rebound counts as none. The remaining bounces would last some 1e-13 s."""
 
 SLIP = 1e-10
-"""m/s; less is no slip: the integrator keeps a slip of 0 to some 1e-13 of the speed."""
+"""m/s; slower slip counts as none: the integrator keeps a slip of 0 to some 1e-13 of the speed."""
 
 MOST_PHASES = 3000
 """Phases of a run: at ε = 0.99 a bouncing particle comes to rest after some 2,400."""
 
-# Rows of the state: way from where the phase began, velocity, spin, belt work and slip heat.
+# Rows of the state: displacement since the phase began, velocity, spin, belt work, slip heat.
 X, V, OMEGA, WORK, HEAT = slice(0, 2), slice(2, 4), 4, 5, 6
 
 
@@ -63,11 +63,11 @@ class UnableError(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class _Surface:
-    """Both faces of a segment, without its ends; or a circle round which a centre can go.
+    """Both faces of a segment, without its ends; or a circle round which a centre can move.
 
-    Circles (`reach` > 0) are the pulley, the ends of segments, and the way round the pulley in a
-    bed. `left` is a segment's left normal; of an end the sum of those of the segments that meet
-    there, which points to the middle of the half that goes on as left faces; 0 of the pulley.
+    Circles (`reach` > 0) are the pulley, the ends of segments, and the path of a layer of a bed
+    round the pulley. `left` is a segment's left normal; for an end the sum over the segments that
+    meet there, which points to the middle of the rim between their left faces; 0 for the pulley.
     """
 
     place: Floats  # first end of a segment, centre of a circle, m
@@ -79,7 +79,7 @@ class _Surface:
     restitution: float
     friction: float
     owner: int  # index into `Machine.surfaces`
-    # Of a circle, the segments that touch it: which, where, the direction from there along it.
+    # The segments that are tangent to a circle: which, where, and the direction from there.
     joined: tuple[tuple[int, Floats, Floats], ...] = ()
 
     @property
@@ -91,7 +91,7 @@ class _Surface:
         return float(self.left @ (place - self.place))
 
     def foot(self, place: Floats) -> float:
-        """How far along a segment the nearest point is, m."""
+        """Distance of the nearest point along a segment, m."""
         return float(self.tangent @ (place - self.place))
 
     def within(self, place: Floats) -> bool:
@@ -101,7 +101,7 @@ class _Surface:
 
 @dataclass(frozen=True)
 class _Lasting:
-    """A contact that lasts: with what, the surface's speed, the sign of the slip (0: none)."""
+    """A lasting contact: the thing touched, its speed, the sign of the slip (0: none)."""
 
     index: int
     normal: Floats  # where it begins
@@ -111,7 +111,7 @@ class _Lasting:
 
 
 def run(machine: Machine, progress: Progress | None = None) -> Record:
-    """Integrate the only particle of a machine; `progress`, told the share done, may end it.
+    """Integrate the only particle of a machine; `progress` gets the share done and may end it.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     Raises
     ------
     UnableError
-        If it is not alone, SciPy is missing, or it gets where the equations here do not reach.
+        If it is not alone, SciPy is missing, or the equations here do not cover its motion.
     """
     try:
         from scipy.integrate import DOP853
@@ -132,7 +132,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
 
 
 def _plain(machine: Machine) -> Machine:
-    """Return a machine of numbers for its only particle, or refuse what the equations lack."""
+    """Return the machine as plain numbers for its only particle; refuse what is not covered."""
     if machine.count > 1:
         raise UnableError("it integrates one particle")
     kind = int(machine.releases.kind[0])
@@ -171,14 +171,14 @@ class _Run:
         self.machine, self.solver, self.root, self.progress = machine, solver, root, progress
         p, releases = machine.particle, machine.releases
         self.r, self.g = p.radius, -machine.gravity * machine.up
-        # Spin that a tangential impulse gives at the rim, and its way back on the slip.
+        # m r²/I: change of the rim's speed over the change of velocity by a tangential impulse.
         self.lever = p.mass * p.radius**2 / p.inertia if p.inertia else 0.0
         self.t0, self.base = float(releases.t[0]), releases.position[0].copy()
         self.state = np.zeros(7)
         self.state[V] = releases.velocity[0]
         self.state[OMEGA] = releases.omega[0]
         self.things = _surfaces(machine)
-        # Whether the left face of a segment was struck last.
+        # For each segment, whether its left face was struck last.
         self.sides: dict[int, bool] = {}
         self.steps, self.landed, self.reason = 0, False, ""
 
@@ -204,18 +204,18 @@ class _Run:
         if not thing.flat:
             away = self.base - thing.place
             return np.asarray(away / hypot(*away))
-        # A point on a line is on neither side: take the face that it struck last.
+        # A mass point on a line is on neither side: take the face that it struck last.
         side = thing.distance(self.base) >= 0.0 if self.r > 0.0 else self.sides.get(index, True)
         return thing.left if side else -thing.left
 
     def lasting(self, index: int, *, carried: bool = False) -> _Lasting:
-        """Return the contact with a thing as it is now, without slip."""
+        """Return the contact with a thing in the present state, without slip."""
         thing, n = self.things[index], self.normal(index)
         belt = thing.speed if n @ thing.left >= 0.0 else -thing.speed
         return _Lasting(index, n, belt, carried=carried)
 
     def touching(self) -> dict[int, Floats]:
-        """Return what the particle touches, with its normal; not the ends of what it touches."""
+        """Return what the particle touches, with normals; not ends of touched segments."""
         found: dict[int, Floats] = {}
         for k, thing in enumerate(self.things):
             if thing.flat:
@@ -229,7 +229,7 @@ class _Run:
         return found
 
     def contact(self) -> _Lasting | None:
-        """Resolve blows until nothing touched is approached; return the contact that lasts then."""
+        """Resolve impacts until nothing touched is approached; return the lasting contact."""
         v, touched = self.state[V], self.touching()
         for _ in range(MOST_PHASES):
             hit = next((k for k, n in touched.items() if v @ n < -REST), None)
@@ -250,7 +250,7 @@ class _Run:
         return self.law(pressed[0], begins=True) if pressed else None
 
     def law(self, index: int, *, begins: bool = False) -> _Lasting | None:
-        """Choose between slip and none on what the particle lies on."""
+        """Choose between slip and grip on what the particle lies on."""
         thing, v, on = self.things[index], self.state[V], self.lasting(index)
         n, load, _, slip, need = (part[..., 0] for part in self.forces(on, self.state[:, None]))
         sign = 0
@@ -281,10 +281,10 @@ class _Run:
                 raise UnableError("it is held between two surfaces")
         return on
 
-    # Forces, and what they do.
+    # Forces and rates.
 
     def forces(self, on: _Lasting, y: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """Return normal, load, friction, slip and what would hold (per mass) at states (7, k)."""
+        """Return normal, load, friction, slip and the holding force (per mass) at states (7, k)."""
         thing = self.things[on.index]
         if thing.flat:
             n = on.normal[:, None] + np.zeros_like(y[X])
@@ -379,7 +379,7 @@ class _Run:
             reach = min(reach, ARC * self.things[on.index].reach)
 
         def longest(y: Floats) -> float:
-            # The way of a step at this speed, and under the weight, is at most `reach`.
+            # At this speed and under gravity a step covers at most `reach`.
             pace = hypot(*y[V]) + sqrt(2.0 * self.machine.gravity * reach)
             return reach / pace if pace > 0.0 else left
 
@@ -391,7 +391,7 @@ class _Run:
         while step.status == "running":
             step.max_step = longest(step.y)
             with np.errstate(over="ignore", invalid="ignore"):
-                step.step()  # which may try a step that is far too long, and take it back
+                step.step()  # which may try a step that is far too long and reject it
             self.steps += 1
             if self.progress is not None:
                 self.progress(min(1.0, (self.t0 + step.t) / self.machine.end_time))
@@ -426,7 +426,7 @@ class _Run:
         return "time", -1
 
     def meetings(self, on: _Lasting | None) -> Iterator[tuple[str, int, Guard]]:
-        """Yield the gaps to all but what the particle lies on, and what that goes over into."""
+        """Yield the gaps to all but the supporting surface and those that continue it."""
         for k, thing in enumerate(self.things):
             if on is not None:
                 joined = on.index in [j for j, _, _ in thing.joined]
@@ -440,7 +440,7 @@ class _Run:
                 yield "meets", k, self.to_circle(thing)
 
     def to_line(self, thing: _Surface, side: float) -> Guard:
-        """Return the gap to a face; of one that is touched it starts as 0, to the last bit."""
+        """Return the gap to a face; if it is touched the gap starts at exactly 0."""
         gap = side * thing.distance(self.base) - self.r
         gap = 0.0 if abs(gap) < TOUCH else gap
         return lambda y: gap + side * (thing.left @ y[X])
@@ -460,7 +460,7 @@ class _Run:
         return left
 
     def to_exit(self, y: Floats) -> Floats:
-        """Return how far it is from leaving the scene."""
+        """Return the distance to the exit box."""
         low, high = self.machine.releases.exit_box[0].reshape(2, 2) - self.base
         return np.asarray(np.minimum(y[X].T - low, high - y[X].T).min(axis=1))
 
@@ -484,7 +484,7 @@ class _Run:
             yield "ends", 1, lambda y: thing.length - along - thing.tangent @ y[X]
             return
         for k, point, inward in thing.joined:
-            # Beside the end of a segment: there its face goes on, if it lies that way.
+            # Beside the end of a segment, where its face continues if it lies in that direction.
             from_end = self.base - point
 
             def outside(y: Floats, a: Floats = from_end, i: Floats = inward) -> Floats:
@@ -499,7 +499,7 @@ class _Run:
             yield "lasts", on.index, lambda y: side * (thing.left @ (tip[:, None] + y[X]))
 
     def next(self, on: _Lasting | None, what: tuple[str, int]) -> _Lasting | None:
-        """Resolve what ended a phase; return the contact that lasts now, if one does."""
+        """Resolve what ended a phase; return the lasting contact, if there is one."""
         name, k = what
         if name in ("time", "exit"):
             if name == "exit":

@@ -58,17 +58,18 @@ def simulate(
     changes : mapping, str, or several
         Laid over the scene as `chutelab.load` does: ``{"plate.angle_deg": 20}``.
     engine : {"auto", "exact", "contact", "pymunk"}, optional
-        Overrides the scene's ``run.engine``. With auto, what the exact engine cannot follow (a
-        spinning disk between a moving surface and another) goes to contact, and where a run breaks
-        a law that every run must keep, the next engine that can runs instead: `Recording.instead`.
+        Overrides the scene's ``run.engine``. With auto, the contact engine runs what the exact one
+        cannot follow (a spinning disk between a moving surface and another); and if a run breaks a
+        law of every run, the next capable engine runs instead: `Recording.instead`.
     progress : callable, optional
         Called now and then with the share of the run that is done, 0 to 1.
     max_seconds : float, optional
         Wall time, s, after which the run ends with what is recorded: particles that have not ended
-        have reason ``"stopped"``, and `results.summary.stopped` says up to when all is there.
-        Looked at after each step or so, which of a large crowd may take some tenths of a second.
+        have the reason ``"stopped"``, and `results.summary.stopped` says up to when the recording
+        is complete. Checked after about each step, which may take some tenths of a second with a
+        large crowd.
     loads : float, optional
-        Count what surfaces bear, in bins of so many seconds: as ``run.loads``; `Recording.loads`.
+        Record loads on surfaces in bins of so many seconds, like ``run.loads``; `Recording.loads`.
 
     Returns
     -------
@@ -109,7 +110,7 @@ def judged(
     progress: Progress | None = None,
     max_seconds: float | None = None,
 ) -> Recording:
-    """Do as `simulate` does, without warning: for callers that read `Recording.laws`."""
+    """Simulate without warnings, for callers that read `Recording.laws`."""
     began = perf_counter()
     if max_seconds is not None and not 0.0 < max_seconds < inf:
         raise ValueError(f"max_seconds = {max_seconds!r}: a finite number above 0 s")
@@ -154,7 +155,7 @@ def judged(
             raise refused(scene, key, counts[most], f"{allowed} start") from None
         if (engine or machine.engine) == "auto" and not cut and recording.laws:
             recording = _instead(machine, recording, watched)
-    # In place: a copy would be judged anew.
+    # In place, since a copy would be judged again.
     object.__setattr__(recording, "seconds", perf_counter() - began)
     for error in cut:
         error.recording = recording  # type: ignore[attr-defined]
@@ -163,7 +164,7 @@ def judged(
 
 
 def _instead(machine: Machine, broken: Recording, progress: Progress | None) -> Recording:
-    """Run a machine with the engines after the one that broke a law, until one keeps all.
+    """Run a machine with the engines after the one that broke a law, until one keeps all laws.
 
     If none does, the first run stands, with its laws.
     """
@@ -183,7 +184,7 @@ def _instead(machine: Machine, broken: Recording, progress: Progress | None) -> 
 
 
 def follow(machine: Machine, engine: str | None, progress: Progress | None) -> Recording:
-    """Run a machine with the engine that is asked for, or the one it needs; see `simulate`."""
+    """Run a machine with the engine asked for, or the one that it needs; see `simulate`."""
     name = choose(machine, engine)
     must_fit(machine, name)
     if name == "exact":
@@ -204,7 +205,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
 
 
 def must_fit(machine: Machine, name: str) -> None:
-    """Raise a `SceneError` if an engine does not have what a machine needs."""
+    """Raise a `SceneError` if an engine lacks a feature that the machine needs."""
     scene = machine.scene
     if name == "contact":
         for key, value, allowed in uncornered(machine):
@@ -259,7 +260,7 @@ def must_fit(machine: Machine, name: str) -> None:
 
 
 def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
-    """Yield what the contact engine does not have with boxes: keys, values, and why not."""
+    """Yield what the contact engine lacks for boxes: keys, values, and why."""
     scene, why = machine.scene, "boxes and polygons; the pymunk engine has them"
     if not scene.cornered:
         return
@@ -288,9 +289,9 @@ def unjoined(machine: Machine) -> str:
 
 
 TAUT = 1e-9
-"""Share of its length by which a string may be too short: that is rounding."""
+"""Share of its length by which a string may be too short, by rounding."""
 
 
 def refused(scene: Scene, key: str, value: object, allowed: str) -> SceneError:
-    """Return the error that says what of a scene cannot be run."""
+    """Return the error that says which part of a scene cannot be run."""
     return SceneError(scene.source, [Fault(key, value, allowed)])

@@ -1,6 +1,6 @@
-"""A scene resolved to world-frame arrays: what the engines take, and all they take.
+"""A scene resolved to world-frame arrays, the only input of the engines.
 
-- `parts`: `Machine`, its particle and its pulley; where surfaces are that move, and how fast.
+- `parts`: `Machine`, its particle and its pulley; places and speeds of moving surfaces.
 - `shapes`: straight and bent pieces of surfaces: nearest point, gap, ends, box, path to draw.
 - `releases`: where, when and how fast each particle starts.
 - `builder`: `build`, from a validated scene, as rows of numbers, to a machine; `ahead`, to one that

@@ -1,10 +1,10 @@
 """`build`: a scene, or a family of them, as a machine.
 
-The core takes a scene as one row of numbers, a family as many rows, and lays the surfaces. Keys of
-the scene's tables have their own names in `layout.h`; NaN is what is not given. Where the nominal
-particle (no spread, lowest layer) meets the unbounded line of the plate gives the height of the
-outgoing belt, and that the lower end of the plate. A release that overlaps a surface is refused, or
-moved out where it is by rounding only.
+The core takes a scene as one row of numbers, a family as many rows, and builds the surfaces. Keys
+of the scene's tables have the same names in `layout.h`; NaN stands for a key that is not given. The
+place where the nominal particle (no spread, lowest layer) meets the unbounded line of the plate
+gives the height of the outgoing belt, and that the lower end of the plate. A release that overlaps
+a surface is refused, or moved out if it does by rounding only.
 """
 
 from __future__ import annotations
@@ -32,20 +32,21 @@ WORDS = {
     "adhesion": inf, "impact": 0.0, "top": 1.0,
     "up": 1.0, "down": -1.0, "right": 2.0, "left": -2.0, "out": 3.0, "in": -3.0,
 }  # fmt: skip
-"""Numbers of what keys may say in words; `drop_from` and `passes` as in layout.h."""
+"""Numbers for values in words; `drop_from` and `passes` as in layout.h."""
 
 PASSES = -1.0
-"""Restitution of two kinds that pass through each other; `meet` of the core's grid.c."""
+"""Restitution that marks two kinds that pass through each other; see `meet` in the core's
+grid.c."""
 
 LACKS = ("length", "stiffness", "damper")
-"""Keys that not all joints have."""
+"""Keys that some joints lack."""
 
 WORD = 2**32
-"""Seeds are handed over as two numbers below it."""
+"""Seeds are passed as two numbers below this."""
 
 
 def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
-    """Return all numbers of a scene; of a family what varies is an array (N,).
+    """Return all numbers of a scene; in a family, varied ones are arrays (N,).
 
     `friction` is that of the nominal particle on the incoming belt, inf with adhesion.
     """
@@ -109,7 +110,7 @@ def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
 
 
 def counts(scene: Scene) -> dict[str, int]:
-    """Return how many tables of each kind a scene has, as a plan of the core has them."""
+    """Return how many tables of each kind a scene has, as the core's plan counts them."""
     return {
         "particles": len(scene.particles), "streams": len(scene.streams),
         "incoming": scene.incoming is not None, "outgoing": scene.outgoing is not None,
@@ -123,10 +124,10 @@ Told = tuple[dict[str, int], Floats]
 
 
 def told(scene: Scene) -> Told:
-    """Return all that the core needs to build the machine of a scene and to run it.
+    """Return the data that the core needs to build and run the machine of a scene.
 
-    Sizes of the plan, and its row with its terms, see `Plan` in layout.h. A scene never changes:
-    they are found once.
+    These are the sizes of the plan, and its row with its terms, see `Plan` in layout.h. A scene
+    never changes, so they are computed once.
     """
     found: Told | None = scene._told
     if found is None:
@@ -158,7 +159,7 @@ def told(scene: Scene) -> Told:
 
 
 def hand_over(module: Module, scene: Scene) -> None:
-    """Tell the core a scene, which it is to build and to run."""
+    """Pass a scene to the core, which will build and run it."""
     sizes, numbers = told(scene)
     plan = module.structs["Plan"]
     for name, size in sizes.items():
@@ -171,16 +172,16 @@ def hand_over(module: Module, scene: Scene) -> None:
 def lay(
     module: Module, scenes: Scene | Family, friction: Numbers
 ) -> tuple[dict[str, NDArray[Any]], NDArray[Any], tuple[Mover, ...]]:
-    """Have the core lay the surfaces of a scene, or of all N scenes of a family.
+    """Have the core build the surfaces of a scene, or of all N scenes of a family.
 
     Returns
     -------
     parts : dict of ndarray, (S,) or (N, S)
-        For each of `KINDS` rows as that in layout.h, by the part of a machine.
+        Rows of each of `KINDS`, as in layout.h, by the part of a machine.
     nominal : ndarray, () or (N,)
         As `Nominal`.
     movers : tuple of Mover
-        How surfaces move; of a family none does.
+        How surfaces move; in a family none does.
     """
     scene, plan = scenes.scene, module.structs["Plan"]
     shape = (len(scenes),) if isinstance(scenes, Family) else ()
@@ -220,11 +221,11 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     Parameters
     ----------
     scenes : Scene or Family
-        Of a family each scene is resolved as it would be by itself; the machine has the particles
-        of all, each with surfaces of its own.
+        In a family each scene is resolved as if alone; the machine has the particles of all, each
+        with its own surfaces.
     watch : callable, optional
-        Called now and then while particles are given their places, which may take long; what it
-        raises ends the building.
+        Called now and then while particles get their places, which may take long; an exception that
+        it raises ends the building.
 
     Raises
     ------
@@ -277,7 +278,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
             surface=0,
             incline=value(belt, "incline_deg") * RADIANS,
         )
-    # Particles of a family never meet.
+    # Particles of a family never meet each other.
     pairs = np.zeros((1, 1, 2))
     every = range(len(particles))
     if family is None:
@@ -333,10 +334,10 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
 
 
 def ahead(scene: Scene) -> Machine:
-    """Return the machine of a scene, which is built when more of it is asked for than its keys."""
+    """Return the machine of a scene; it is built when more than its keys is needed."""
     if (known := scene._ahead) is None:
         if scene.hinges or scene.triggers:
-            # Whether hinges can be is known once they are weighed.
+            # Hinges can be checked only after they are weighed.
             return build(scene)
         known = scene._ahead = _keys(scene)
     machine = object.__new__(Machine)
@@ -345,7 +346,7 @@ def ahead(scene: Scene) -> Machine:
 
 
 def _keys(scene: Scene) -> dict[str, Any]:
-    """Return what a machine has of the keys of its scene; with joints or movers not these."""
+    """Return the parts of a machine that follow from keys alone, without joints and movers."""
     until, names = scene.run.until, scene.surfaces
     return dict(
         build=build,
@@ -375,14 +376,14 @@ Met = Sequence[Sequence[tuple[Any, Any]]]
 
 
 def _pieces(kind: type[Pieces], rows: NDArray[Any], met: Met, kinds: int) -> Pieces:
-    """Return one kind of pieces of their rows, (S,) or of a family (N, S)."""
+    """Return one kind of pieces from their rows, (S,) or in a family (N, S)."""
     shape = rows.shape[:-1]
     if not rows.size:
-        rows = rows.reshape(-1)  # without pieces there is nothing by scene
+        rows = rows.reshape(-1)  # without pieces there is nothing per scene
     known = [name for name in kind.__dataclass_fields__ if name in (rows.dtype.names or ())]
     own = {name: rows[name] for name in known}
     if rows.ndim > 1:
-        # Those of all members lie side by side; they belong to the same surfaces.
+        # Pieces of all members lie side by side and belong to the same surfaces.
         own = {
             name: array[0].copy() if name == "surface" else array.T.copy().T
             for name, array in own.items()
@@ -426,23 +427,23 @@ def _particle(scenes: Scene | Family, kind: Ints, radius: Floats | None) -> Part
         mass, inertia = np.array(masses)[kind], np.array(inertias)[kind]
     radius = nominal if radius is None else radius
     size = radius / nominal
-    # Powers of libraries differ in the last bit.
+    # Powers by libraries differ in the last bit.
     square = size * size
     cube = square * size
     return Particle(radius, mass * cube, inertia * (cube * square))
 
 
 NEAR = 1e-9
-"""m; a string or a rod is at least so long."""
+"""m; least length of a string or rod."""
 
 ONE_PLACE = "another place than the particle's at the release; a [[pin]] joins what is in one place"
 
 SWIFTEST = 1e5
-"""rad/s; shortest times of hinges are at least 1 over it: steps have to be shorter."""
+"""rad/s; the shortest time of a hinge is at least its inverse, as steps have to be shorter."""
 
 
 def _weigh_hinges(scene: Scene, movers: tuple[Mover, ...]) -> None:
-    """Raise if what hangs on a hinge has an inertia that no mass has, or is too stiff to be run."""
+    """Raise if a hinged surface has an impossible inertia, or is too stiff to be run."""
     for mover in movers:
         if (hinge := mover.hinge) is None:
             continue
@@ -461,7 +462,7 @@ def _weigh_hinges(scene: Scene, movers: tuple[Mover, ...]) -> None:
 
 
 def _judged(scenes: Scene | Family, nominal: NDArray[Any]) -> tuple[Caution, ...]:
-    """Return what may surprise about the plate; raise if the geometry contradicts itself."""
+    """Return cautions about the plate; raise if the geometry contradicts itself."""
     scene, members = scenes.scene, nominal.reshape(-1)
     plate = scene.plate
     faults = {

@@ -1,8 +1,8 @@
-"""`Machine` and its parts: what the engines take, and all they take.
+"""`Machine` and its parts, the only input of the engines.
 
-Also here: how surfaces move. A `Mover` is where one is at any time, what hangs on a hinge once it
-has run. It is for what draws machines and checks runs, and for Pymunk's bodies; the core has its
-own (motion.c).
+Also here: the motion of surfaces. A `Mover` gives the place of one at any time, that of a hinged
+one after its run. It is used to draw machines, to check runs, and for Pymunk's bodies; the core has
+its own (motion.c).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ DRIVE_PULLEY = "the drive pulley"
 
 @dataclass(frozen=True)
 class Caution:
-    """Something about a machine that works, but may surprise."""
+    """A warning about a machine that works but may behave unexpectedly."""
 
     surface: str  # the surface it is about
     crosses: str = ""  # another surface or `DRIVE_PULLEY`; "" if the nominal particle misses it
@@ -34,7 +34,7 @@ class Caution:
 
     @property
     def text(self) -> str:
-        """It in words, without the name of the surface."""
+        """The warning in words, without the name of the surface."""
         if self.crosses:
             return f"it crosses {self.crosses}"
         if isnan(self.hit):
@@ -62,7 +62,7 @@ class Particle:
         return all(np.array_equal(vars(self)[name], vars(other)[name]) for name in vars(self))
 
     def of(self, index: Any) -> Particle:
-        """Return some of the particles, by their numbers."""
+        """Return some of the particles by their numbers."""
         own = (value[index] if np.ndim(value) else value for value in vars(self).values())
         return Particle(*own)
 
@@ -145,7 +145,7 @@ class Joint:
 
 
 class Trigger(NamedTuple):
-    """What a surface does when another one is touched for the first time."""
+    """Action of a surface when another one is touched for the first time."""
 
     surface: int  # index into `Machine.surfaces`
     doing: str  # opens, closes or starts
@@ -153,19 +153,19 @@ class Trigger(NamedTuple):
 
 
 EARTH = 9.81
-"""m/s²; gravity for which engines' bounds on speeds and times are written, see `Machine.pace`."""
+"""m/s²; gravity for which the engines' bounds on speeds and times hold, see `Machine.pace`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Machine:
-    """Everything an engine needs to run.
+    """The complete input of an engine.
 
     A family of machines, a copy of one for each particle, is one machine in which surfaces,
     gravity, radius and mass of the particle, the pulley's numbers and the end time have a value for
     each, (N,).
 
-    One that `is_ahead` has only what needs no geometry, and `build`; the rest is built when it is
-    first asked for. An engine that has the core build it never asks.
+    If it `is_ahead`, it has only what needs no geometry, and `build`; the rest is built when it is
+    first needed, which is never if the core builds the machine itself.
     """
 
     scenes: Scene | Family  # what it was built from
@@ -179,30 +179,30 @@ class Machine:
     releases: Releases
     landing: int  # surface index of the outgoing belt, -1 without one
     until: Literal["landed", "settled", "time"]  # when a particle's track ends
-    end_time: float  # s; no track goes on after it
+    end_time: float  # s; all tracks end by this time
     dt: float  # s; step of lasting contacts (contact), longest step (pymunk)
     align: bool  # whether the pymunk engine's steps of a lone particle end at contacts; not in air
     interact: bool  # whether particles meet each other
-    pair_restitution: Floats  # (K, K), of two particles by their kinds; below 0: they never meet
+    pair_restitution: Floats  # (K, K), of two particles by their kinds; negative if they never meet
     pair_friction: Floats
-    rolling: Floats  # (K,), rolling friction of a kind on everything: its arm over the radius
-    cohesion: Floats  # (K, K + S), N; pulls a kind to another, and to a surface
+    rolling: Floats  # (K,), rolling friction of each kind: its arm over the radius
+    cohesion: Floats  # (K, K + S), N; cohesion of a kind with another, and with a surface
     outlines: tuple[Floats | None, ...]  # (K); of boxes and polygons corners (n, 2)
     joints: tuple[Joint, ...]
     movers: tuple[Mover, ...]
     triggers: tuple[Trigger, ...]
     streams: tuple[str, ...]  # names; `Releases.stream` tells whose a particle is
-    falls: Floats  # (K,), s/m: 1 over the speed up to which a kind's restitution is what it is
+    falls: Floats  # (K,), s/m: inverse of the speed up to which a kind's restitution is constant
     engine: str  # what the scene asks for: "auto", "exact", "contact" or "pymunk"
     plate_warnings: tuple[Caution, ...]  # of a nominal particle that misses the plate
 
     @property
     def is_ahead(self) -> bool:
-        """Whether it is not built yet."""
+        """Whether the machine is not built yet."""
         return "releases" not in vars(self)
 
     def finish(self, watch: Watch = unwatched) -> None:
-        """Build what is not built yet, see `chutelab.machine.build`."""
+        """Build the missing parts, see `chutelab.machine.build`."""
         if self.is_ahead:
             vars(self).update(vars(vars(self)["build"](self.scenes, watch)))
 
@@ -227,7 +227,7 @@ class Machine:
 
     @property
     def tilt(self) -> float:
-        """By which gravity is turned from straight down, counterclockwise, rad."""
+        """Angle of gravity from straight down, counterclockwise, rad."""
         return self.scene.gravity_deg * RADIANS
 
     @cached_property
@@ -237,18 +237,18 @@ class Machine:
 
     @cached_property
     def frame(self) -> Floats:
-        """Unit vectors of a frame that is upright where gravity points down, rows, (2, 2)."""
+        """Unit vectors (rows) of the frame in which gravity points down, (2, 2)."""
         x, y = self.up
         return np.array([[y, -x], [x, y]])
 
     def height(self, position: Floats) -> Floats:
-        """Return how high places (..., 2) are, (...), m: against gravity, from the origin."""
+        """Return the heights (...) of places (..., 2), m: against gravity, from the origin."""
         found: Floats = self.up[0] * position[..., 0] + self.up[1] * position[..., 1]
         return found
 
     @cached_property
     def pace(self) -> Any:
-        """What bounds on speeds are multiplied by, and bounds on times divided; (N,) of a family.
+        """Factor of bounds on speeds, and divisor of bounds on times; (N,) in a family.
 
         √(g / 9.81 m/s²), and 1 without gravity: a run repeats if all its speeds are twice as high,
         all its times half as long, and gravity is four times as strong.
@@ -262,14 +262,14 @@ class Machine:
 
     @property
     def stress(self) -> float:
-        """Width of the bins in which lasting contacts are kept, s; 0 if they are not."""
+        """Width of the bins in which lasting contacts are recorded, s; 0 if they are not."""
         return 0.0 if self.family is not None else self.scene.run.stress or 0.0
 
     @cached_property
     def loose(self) -> float:
-        """By which tracks may be further off circles between two knots, as a share of the radius.
+        """Additional error of tracks on circles between two knots, as a share of the radius.
 
-        0 but of a family, of which nothing is read there: what its laws do not see is less than a
+        0 except in a family, whose tracks are not read between knots; its laws overlook less than a
         ten thousandth of a particle's radius.
         """
         if self.family is None:
@@ -285,11 +285,11 @@ class Machine:
         return len(self.releases.t)
 
     def mover(self, surface: int) -> Mover | None:
-        """Return what moves a surface, by its index; None if it stays where it is."""
+        """Return the mover of a surface, by its index; None if it is fixed."""
         return next((mover for mover in self.movers if mover.surface == surface), None)
 
     def when(self, times: Floats) -> Machine:
-        """Return it with the times at which its triggers acted, s; inf of what still waits."""
+        """Return the machine with the times of its triggers, s; inf for those that did not act."""
         parts: dict[str, Any] = {"segments": self.segments, "arcs": self.arcs}
         movers = list(self.movers)
         for (surface, doing, _), t in zip(self.triggers, times.tolist(), strict=True):
@@ -303,7 +303,7 @@ class Machine:
         return replace(self, movers=tuple(movers), **parts)
 
     def steered(self, surface: int) -> Mover:
-        """Return what moves a plate, by its index, that is turned by hand about its pivot."""
+        """Return the mover of a plate, by its index, that is turned by hand about its pivot."""
         named = {plate.name or "plate": plate for plate in self.scene.plates}
         plate, belt = named[self.surfaces[surface]], self.scene.incoming
         pivot = plate.pivot
@@ -314,12 +314,12 @@ class Machine:
 
     @property
     def parts(self) -> tuple[Segments, Arcs]:
-        """All surfaces but the drive pulley, a kind of piece each."""
+        """All surfaces but the drive pulley, by kind of piece."""
         return self.segments, self.arcs
 
     @property
     def broad(self) -> Any:
-        """Radius of the circle with each particle's area, m, (N,): of a disk its radius."""
+        """Radius of the circle with the area of each particle, m, (N,)."""
         found = np.broadcast_to(np.asarray(self.particle.radius, dtype=float), self.count).copy()
         for kind, corners in enumerate(self.outlines):
             if corners is not None:
@@ -329,14 +329,14 @@ class Machine:
 
     @property
     def last_gate(self) -> float:
-        """When a surface comes, goes or moves for the last time, s; -inf if none does."""
+        """Last time at which a surface appears, vanishes or moves, s; -inf if none does."""
         times = np.concatenate([[p.appears, p.vanishes] for p in self.parts], axis=1)
         rest = max((mover.rests for mover in self.movers), default=-inf)
         return max(rest, float(times[np.isfinite(times)].max(initial=-inf)))
 
     @property
     def corners(self) -> Floats:
-        """Points round which the box of all segments and arcs goes, (..., C, 2), m."""
+        """Points whose bounding box holds all segments and arcs, (..., C, 2), m."""
         parts = [part for part in self.parts if part.surface.size]
         return np.concatenate([part.corners for part in parts or [self.segments]], axis=-2)
 
@@ -354,12 +354,12 @@ class Machine:
 
     @cached_property
     def warnings(self) -> tuple[Caution, ...]:
-        """What `chutelab check` tells about a machine that works but may surprise."""
+        """Warnings of `chutelab check` about a machine that works."""
         crossed = crossings(len(self.surfaces), self.segments, self.arcs)
         said = [Caution(self.surfaces[b], self.surfaces[a]) for a, b in crossed]
         if self.pulley is not None:
             into = [part.surface[part.gap(np.zeros(2)) < self.pulley.radius] for part in self.parts]
-            # The incoming belt, which lies on it, is surface 0.
+            # The incoming belt, which lies on the pulley, is surface 0.
             owners = np.setdiff1d(np.concatenate(into), [0])
             said += [Caution(self.surfaces[owner], DRIVE_PULLEY) for owner in owners]
         return (*self.plate_warnings, *said)
@@ -368,17 +368,17 @@ class Machine:
 SWING = np.dtype([
     ("t", "f8"), ("angle", "f8"), ("rate", "f8"), ("surface", "i4"), ("pad", "i4")
 ])  # fmt: skip
-"""One state of what hangs on a hinge, in SI units.
+"""One state of a hinged surface, in SI units.
 
-- ``t``: when, s; two at one time are before and after a blow.
-- ``angle``, ``rate``: how far it has turned from where it is written, rad, and how fast, rad/s.
+- ``t``: time, s; two states at one time are before and after an impact.
+- ``angle``, ``rate``: angle from its place as written, rad, and angular velocity, rad/s.
 - ``surface``: index into `Recording.surfaces`; ``pad`` is 0.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Hinge:
-    """What hangs on a hinge: what acts on it, and once it has run its states."""
+    """A hinge: what acts on it and, after its run, its states."""
 
     inertia: float  # kg m2, about the hinge
     moment: tuple[float, float]  # kg m; mass times its centre's place from the hinge, as written
@@ -389,11 +389,11 @@ class Hinge:
     motor: tuple[float, float]  # rad/s and N m; 0 without
     mass: float = 0.0  # kg; 0 without a weight
     gyration: float = 1.0  # m; root of the mean square distance from the hinge
-    steered: bool = False  # it is turned by hand, and nothing else acts on it
+    steered: bool = False  # whether it is turned by hand only
     states: NDArray[Any] = field(default_factory=lambda: np.zeros(1, SWING))  # (k,) of `SWING`
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
-        """Return angle, rad, and its rate, rad/s, at times (...,), s: cubics between its states."""
+        """Return angle, rad, and rate, rad/s, at times (...,), s, by cubics between its states."""
         t, angle, rate = (self.states[name] for name in ("t", "angle", "rate"))
         if len(t) < 2:
             return np.full_like(times, angle[0]), np.full_like(times, rate[0])
@@ -407,9 +407,9 @@ class Hinge:
         return angle[left] + s * (va + s * bent), np.where(s < 1.0, pace, rate[left + 1])
 
     def energies(self, angle: Any, rate: Any, gravity: float, up: Floats) -> Any:
-        """Return kinetic energy, that of its weight from its hinge's height, and its spring's, J.
+        """Return kinetic energy, potential energy above the hinge's height, and spring energy, J.
 
-        Of angles, rad, and rates, rad/s, of one shape; `up` is the direction against gravity, (2,).
+        Angles, rad, and rates, rad/s, have one shape; `up` is the direction against gravity, (2,).
         """
         x, y = self.moment
         sine, cosine = np.sin(angle), np.cos(angle)
@@ -430,12 +430,12 @@ class Mover:
     start: float  # ... s; from then on ...
     lasts: float  # ... and for so long, 0 if it does not
     turn: float  # rad/s, counterclockwise
-    hinge: Hinge | None = None  # what it hangs on; then nothing else moves it
-    begins: float = 0.0  # s; from when on it moves, and its times are counted
+    hinge: Hinge | None = None  # its hinge, if it has one; then it has no other motion
+    begins: float = 0.0  # s; start of the motion, from which its times count
 
     @classmethod
     def of(cls, row: Any) -> Self:
-        """Return what a row of the core's `Mover` says."""
+        """Return the mover of a row of the core's `Mover`."""
         told: dict[str, Any] = {name: tuple(row[name].tolist()) for name in ("pivot", "by", "way")}
         told |= {name: float(row[name]) for name in ("frequency", "phase", "lasts", "turn")}
         if row["inertia"] > 0.0:
@@ -447,13 +447,13 @@ class Mover:
 
     @classmethod
     def steered(cls, surface: int, pivot: tuple[float, float]) -> Self:
-        """Return that of a plate which is turned by hand."""
+        """Return the mover of a plate that is turned by hand."""
         none = (0.0, 0.0)
         hinge = Hinge(0.0, none, 0.0, 0.0, 0.0, (-inf, inf), none, steered=True)
         return cls(surface, pivot, none, 0.0, 0.0, none, 0.0, 0.0, 0.0, hinge)
 
     def swung(self, swings: NDArray[Any]) -> Mover:
-        """Return it with the states, (k,) of `SWING`, in which it is found among them."""
+        """Return the mover with its own states among all states, (k,) of `SWING`."""
         if self.hinge is None:
             return self
         own = swings[swings["surface"] == self.surface]
@@ -461,7 +461,7 @@ class Mover:
 
     @property
     def rests(self) -> float:
-        """From when on it is at rest for good, s; inf if never."""
+        """Time from which it stays at rest, s; inf if never."""
         endless = self.hinge or self.turn or (self.frequency and any(self.by))
         return inf if endless else self.begins + self.start + self.lasts
 
@@ -472,7 +472,7 @@ class Mover:
         return np.array([[c, s], [-s, c]])
 
     def tell(self, row: Any) -> None:
-        """Fill in what a row of the core's `Mover` is told."""
+        """Fill in a row of the core's `Mover`."""
         own = dict(vars(self))
         hinge = own.pop("hinge")
         own |= {} if hinge is None else vars(hinge)
@@ -483,8 +483,8 @@ class Mover:
     def pose(self, times: ArrayLike) -> Floats:
         """Return x and y (m) of the pivot and the angle it has turned by (rad) at times (s).
 
-        Of times (T,) it is (T, 3). It travels with an even acceleration up to the middle, and the
-        same against it from there on.
+        For times (T,) it is (T, 3). It travels with a constant acceleration up to the middle, and
+        with the opposite one from there on.
         """
         now = np.asarray(times, dtype=np.float64)
         t = np.maximum(now - self.begins, 0.0)
@@ -495,7 +495,7 @@ class Mover:
         return np.stack([x, y, self.hinge.at(now)[0] if self.hinge else self.turn * t], axis=-1)
 
     def velocity(self, times: ArrayLike) -> Floats:
-        """Return the rates of what `pose` does: m/s, m/s and rad/s, (T, 3) of times (T,), s."""
+        """Return the rates of `pose`: m/s, m/s and rad/s, (T, 3) for times (T,), s."""
         now = np.asarray(times, dtype=np.float64)
         t, moves = np.maximum(now - self.begins, 0.0), now >= self.begins
         rate = 2.0 * pi * self.frequency
@@ -509,7 +509,7 @@ class Mover:
         return np.stack([moves * x, moves * y, turn], axis=-1)
 
     def velocity_at(self, place: ArrayLike, t: float) -> Floats:
-        """Return the velocity, m/s, (2,), of its point that is at `place`, (2,), m, at `t`, s.
+        """Return the velocity, m/s, (2,), of its point at `place`, (2,), m, at the time `t`, s.
 
         It is that of the pivot and ω x r, r from the pivot to the place.
         """
@@ -518,14 +518,14 @@ class Mover:
         return np.array([vx - omega * (py - y), vy + omega * (px - x)])
 
     def carried(self, places: ArrayLike, times: ArrayLike) -> Floats:
-        """Return where it carries places (..., 2), m, as written, at times (...,), s."""
+        """Return the positions at times (...,), s, of points (..., 2) given as written, m."""
         pose, off = self.pose(times), np.asarray(places) - np.array(self.pivot)
         c, s = np.cos(pose[..., 2]), np.sin(pose[..., 2])
         x = pose[..., 0] + c * off[..., 0] - s * off[..., 1]
         return np.stack([x, pose[..., 1] + s * off[..., 0] + c * off[..., 1]], axis=-1)
 
     def at_rest(self, places: ArrayLike, times: ArrayLike) -> Floats:
-        """Return what it carries to places (..., 2), m, at times (...,), s: as written."""
+        """Return the points as written that are at places (..., 2), m, at times (...,), s."""
         pose = self.pose(times)
         off, c, s = np.asarray(places) - pose[..., :2], np.cos(pose[..., 2]), np.sin(pose[..., 2])
         x = self.pivot[0] + c * off[..., 0] + s * off[..., 1]

@@ -1,4 +1,4 @@
-"""Where, when and how fast each particle of the stream starts: the core draws it."""
+"""Where, when and how fast each particle of the streams starts; the core draws it."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from chutelab.util.arrays import RADIANS, Bools, Floats, Ints, Numbers, Watch, s
 from chutelab.util.tables import number
 
 LOOKS = 1_000_000
-"""Particles and places that the core looks at between two looks at the clock; 10 ms."""
+"""Particles and places that the core tries between two checks of the clock; 10 ms."""
 
 DEEP = 0.01
-"""Share of the radius. Riders of one layer that touch, 2 r of arc apart, are by r³/(3 ρ²) nearer on
-the chord: by less than this where r < ρ/6."""
+"""Share of the radius. Riders of one layer that touch, 2 r apart along the arc, are nearer on the
+chord by r³/(3 ρ²), less than this if r < ρ/6."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +32,11 @@ class Releases:
     position: Floats
     velocity: Floats
     omega: Floats  # rad/s
-    angle: Floats  # rad, from as what has corners is written
+    angle: Floats  # rad; angle of boxes and polygons from their shape as written
     # rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation
     carried: Bools
     stream: Ints  # its number: particles of the first stream come first, then those of the next
-    kind: Ints  # its row in the machine's tables of pairs; of a family each has a row of its own
+    kind: Ints  # its row in the machine's tables of pairs; in a family each has its own row
     # (N, 4), m: left, bottom, right and top of where it is in the scene. With gravity only the
     # bottom is finite: what flies up comes back. What is released below all surfaces, or hangs on a
     # string, has not left: the box holds releases, too. Where particles do not meet it holds each
@@ -50,15 +50,15 @@ class Releases:
 
 @dataclass(frozen=True)
 class Squeeze:
-    """Riders by adhesion that get into each other round the pulley.
+    """Particles riding by adhesion that overlap round the pulley.
 
-    All layers of a bed have the belt's speed, the lower ones on smaller circles: where the pulley
-    does not throw them off at its top, they turn ahead, into what rides above them.
+    All layers of a bed have the belt's speed, the lower ones on smaller circles. If they do not
+    leave at the top of the pulley, they turn ahead, into the layers above them.
     """
 
-    particles: int  # how many are in another by more than `DEEP`
-    deepest: float  # overlap of the worst two, m
-    grip: float  # v²/(g ρ) of the highest rider: it stays on the pulley until cos φ is this
+    particles: int  # number of particles that overlap another by more than `DEEP`
+    deepest: float  # largest overlap, m
+    grip: float  # v²/(g ρ) of the highest one: it leaves the pulley where cos φ has this value
 
     def __str__(self) -> str:
         return (
@@ -72,12 +72,11 @@ class Squeeze:
 def squeeze(
     scene: Scene, t: Floats, position: Floats, radius: Numbers | None = None
 ) -> Squeeze | None:
-    """Return which particles ride into others; None if none does.
+    """Return the particles that ride into others; None if none does.
 
-    Riders are released at `t` (N,), s, and `position` (N, 2), m: planned, or of a run. Their radii,
-    m, are by default that of the first kind of particles. A ride that something ends early counts
-    as if it went on. Two that would be in each other on the belt already do not count: one of them
-    waits.
+    They are released at `t` (N,), s, and `position` (N, 2), m, as planned or in a run. Their radii,
+    m, are by default that of the first kind of particles. A ride that ends early counts as if it
+    went on. Two that would overlap already on the belt do not count, since one of them waits.
     """
     belt = scene.incoming
     if belt is None or not len(t) or not isinstance(belt.friction, str):
@@ -96,7 +95,7 @@ def squeeze(
     leaves = top + rho * turn[order] / belt.speed
     depth = np.zeros(len(top))
     for lag in range(1, len(top)):
-        # The later one is on the pulley from its own top, both are until one leaves.
+        # Both are on the pulley from when the later one reaches its top until one leaves.
         begin, end = top[lag:], np.minimum(leaves[:-lag], leaves[lag:])
         if (begin >= leaves[:-lag]).all():
             break
@@ -133,14 +132,14 @@ class RefusedError(SceneError):
 def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases, Floats | None]:
     """Have the core draw the releases of a scene; the same scene and seed give the same numbers.
 
-    They are of all streams, one after the other, drawn in a module in which the scene's surfaces
-    are laid, see `machine.builder.lay`; of a family scene by scene. Also returned are the radii,
-    (N,), m, or None if all particles are alike. `watch` is called now and then; what it raises ends
-    the drawing.
+    All streams are drawn, one after the other, in a module in which the scene's surfaces are built,
+    see `machine.builder.lay`; in a family scene by scene. Also returned are the radii, (N,), m, or
+    None if all particles are alike. `watch` is called now and then; an exception that it raises
+    ends the drawing.
 
-    Particles that meet start where no other of their stream is, as far as the bed has room: an
-    engine lets the others wait until their place is free. None starts in a surface: one that is in
-    it by rounding is moved out.
+    Particles that meet start where no other of their stream is, as far as the bed has room; the
+    engine delays the others until their place is free. None starts inside a surface; one that does
+    by rounding is moved out.
 
     Raises a `RefusedError` if a box has not room for all, a particle would start inside a surface,
     or a belt that grips by adhesion does not allow its speed.
@@ -193,7 +192,7 @@ def _fault(scenes: Scene | Family, refusal: Any, member: int) -> Fault:
     )
 
     def own(key: str) -> Any:
-        """Return what this member has under a key of the stream, points and vectors as lists."""
+        """Return a member's value of a key of the stream, points and vectors as lists."""
         found = scenes.value(stream, key)
         if found is None:
             return None

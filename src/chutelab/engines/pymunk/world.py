@@ -27,35 +27,36 @@ GRIP = 1e9
 
 HAIR = 2e-11
 """Share of the radius by which a disk in the Space is larger than the particle, so that Chipmunk
-sees a contact where centre and surface are one radius apart. Levers are off by as much."""
+detects a contact when centre and surface are one radius apart. Levers have the same error."""
 
 DIGITS = 16.0 * float(np.finfo(float).eps)
 """Share of the machine's size below which a gap is rounding."""
 
 TINY = 1e-12
-"""Share of `Machine.pace` in m/s plus the particle's speed; so slow an approach is no blow."""
+"""Share of the sum of `Machine.pace` (m/s) and the particle's speed; a slower approach is no
+impact."""
 
 LOW = 2.0
-"""Hairs; bounces lower than this cannot be told from lying on the surface."""
+"""In hairs; lower bounces cannot be distinguished from rest on the surface."""
 
 SHORT = 1e-5
-"""Share of a step; a contact that lasts less has ended, and a surface just left is looked at again
-after that."""
+"""Share of a step: a shorter contact has ended, and a surface just left is checked again after this
+time."""
 
 
 JOINT = 0.0625
-"""Hairs. Where another piece goes on from its end, an arc reaches past it, and what slides on to it
-touches both; by so little that its way there is, whichever way both bend, never deeper in the arc
-than 4 times this: less than the depth at which a step ends because a surface is met."""
+"""In hairs. Where another piece continues an arc, the arc is made longer by this, so that a
+particle that slides onto it touches both. However both bend, the particle is then at most 4 times
+this deep in the arc, less than the depth at which a step ends because a surface is met."""
 
 ALIKE = 1e-9
-"""Directions (rad), and curvatures as a share, that differ by less are one."""
+"""Directions (rad) and curvatures (relative) that differ by less count as equal."""
 
 ARC = 0.025
 """rad between knots round the pulley: ρ Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
 
 NONE = (Vec2d.zero(), Vec2d.zero())
-"""Crowns of what has no ends."""
+"""Crowns of a face without ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +70,13 @@ class Face:
     surface: int  # index into `Machine.surfaces`
     tangent: Vec2d | None  # direction of a segment
     speed: float  # m/s
-    restitution: float  # of the pair with a particle, and so is friction
+    restitution: float  # of the pair with a particle, as is friction
     friction: float  # finite
     radius: float  # of the particle, m
-    appears: float  # from when to when it is there, s
+    appears: float  # time span in which it exists, s
     vanishes: float
     one_sided: int  # 1 if it is solid on its left, -1 if on its right; of an arc outside, inside
-    spin: float  # of a wheel, rad/s: what rolls on it rolls as fast as it turns against this
+    spin: float  # angular velocity of a wheel, rad/s; rolling is relative to it
     crowns: tuple[Vec2d, Vec2d]  # see `World._crown`; at the first end and at the last
 
     @cached_property
@@ -85,7 +86,7 @@ class Face:
 
     @property
     def touched(self) -> pymunk.Shape:
-        """The shape in the Space that a particle by itself is in contact with."""
+        """The shape in the Space that a lone particle touches."""
         return self.shape
 
     @property
@@ -94,21 +95,21 @@ class Face:
         return self.tangent is None
 
     def put(self, x: Vec2d) -> None:
-        """Make ready to be touched from a place (m)."""
+        """Prepare for contact with a particle at a place (m)."""
 
     def gap(self, x: Vec2d) -> tuple[float, Vec2d]:
         """Return the gap (m) between the surface and a disk round a point, and the normal there.
 
-        Nearer than 1e-5 m Chipmunk has a segment's own normal for it, on either side.
+        Closer than 1e-5 m Chipmunk returns the segment's own normal, on either side.
         """
         found = self.shape.point_query(x)
         normal = found.gradient if self.tangent is None else (x - found.point).normalized()
         return found.distance - self.radius, normal
 
     def side(self, x: Vec2d) -> float:
-        """Return how far a place is on the solid side (m), less than 0 on the other; 0 if on both.
+        """Return the distance to the solid side (m), negative on the other; 0 if both are solid.
 
-        Beyond an end that is the side of its straight way on.
+        Beyond an end it is measured from the straight continuation.
         """
         if not self.one_sided or self.tangent is None or self.shape.body is None:
             return 0.0
@@ -119,20 +120,20 @@ class Face:
     def belt(self, normal: Vec2d) -> float:
         """Return the speed (m/s) of the surface along (n_y, -n_x) where a disk touches it.
 
-        It is that of an end roller at the ends: the same on the rim as on the face on that side.
+        At the ends it is that of an end roller: the same on the rim as on the adjoining face.
         """
         if self.tangent is None or self.crowns[self.tangent.dot(normal) > 0.0].dot(normal) >= 0.0:
             return self.speed
         return -self.speed
 
     def hollow(self, x: Vec2d) -> float:
-        """Return 1 over the radius (1/m) on which a disk's centre follows a hollow side, or 0."""
+        """Return the curvature (1/m) of a centre's path inside an arc, 0 elsewhere."""
         return 0.0
 
     def free(
         self, path: Flight | Carriage, x: Vec2d, v: Vec2d, gap: float, rate: float, pull: float
     ) -> float:
-        """Return a time (s) in which a disk at a place on a path surely meets no surface.
+        """Return a time (s) within which a disk on a path cannot meet the surface.
 
         A convex one lies behind the plane through its nearest point: the gap stays above
         gap + rate τ + pull τ²/2, with the rate and the least acceleration along the normal there.
@@ -144,8 +145,8 @@ class Face:
 class Bend(Face):
     """An arc, met from inside and outside, or a whole circle; the ends of an arc are other faces.
 
-    Chipmunk has no hollow shape. Its distance query on the circle tells the gap, on either side; to
-    be pushed, a disk is given a point to lie on, put where the circle is nearest.
+    Chipmunk has no concave shape. Its distance query on the circle gives the gap on either side.
+    For contact the disk gets a point to lie on, placed where the circle is nearest.
     """
 
     foot: pymunk.Circle  # without radius, on a body of its own
@@ -169,7 +170,7 @@ class Bend(Face):
         return self.shape.body.position
 
     def put(self, x: Vec2d) -> None:
-        """Put the foot where the arc is nearest to a place (m), or out of reach beside an arc."""
+        """Move the point to where the arc is nearest (m), or out of reach beside it."""
         assert self.foot.body is not None
         assert isinstance(self.shape, pymunk.Circle)
         beside = self.gap(x)[0] == inf
@@ -180,13 +181,13 @@ class Bend(Face):
     def outward(self, x: Vec2d) -> Vec2d:
         """Return the direction of a place from the centre.
 
-        Nearer to the centre than 1e-5 m Chipmunk has its own, the same for all places.
+        Closer to the centre than 1e-5 m Chipmunk returns a fixed direction.
         """
         away = x - self.center
         return away.normalized() if away.length > 0.0 else Vec2d(0.0, 1.0)
 
     def gap(self, x: Vec2d) -> tuple[float, Vec2d]:
-        """Return the gap (m) and the normal; inf where an end is nearer than all between them."""
+        """Return the gap (m) and the normal; inf where an end is nearest."""
         distance, away = self.shape.point_query(x).distance, self.outward(x)
         side = 1.0 if distance >= 0.0 else -1.0
         if (atan2(away.y, away.x) - self.begin) % (2.0 * pi) > self.extent:
@@ -194,7 +195,7 @@ class Bend(Face):
         return side * distance - self.radius, side * away
 
     def side(self, x: Vec2d) -> float:
-        """Return how far a place is on the solid side (m): outside of it, or inside."""
+        """Return the distance to the solid side (m): outside of the arc, or inside."""
         return self.one_sided * self.shape.point_query(x).distance
 
     def belt(self, normal: Vec2d) -> float:
@@ -212,11 +213,11 @@ class Bend(Face):
     def free(
         self, path: Flight | Carriage, x: Vec2d, v: Vec2d, gap: float, rate: float, pull: float
     ) -> float:
-        """Return a time (s) in which it is not met; see `Face.free` for the outside.
+        """Return a time (s) within which it cannot be met; for the outside see `Face.free`.
 
-        Beside an arc that is the time to a line through the centre and an end. Inside, with c from
-        the centre to the place, ρ² - c² starts at the gap times ρ + c, changes at -2 c·v, and that
-        by -2 (v² + c·a), which is bounded for the time that it takes to go some ρ.
+        Beside an arc it is the time to a line through the centre and an end. Inside, with c from
+        the centre to the place, ρ² - c² starts at the gap times ρ + c, has the rate -2 c·v and the
+        second derivative -2 (v² + c·a), which is bounded for a path of some ρ.
         """
         away = x - self.center
         if gap == inf:
@@ -224,9 +225,9 @@ class Bend(Face):
             sides = [line.perpendicular() for line in lines]
             sides = [side if away.dot(side) >= 0.0 else -side for side in sides]
             ahead = min(falls(away.dot(n), v.dot(n), path.pull(n)) for n in sides)
-            # Past the line, or it might take itself to be on either side of it.
+            # Go past the line, so that the side is certain.
             pace = max(v.length, sqrt(path.most * self.radius))
-            # What lies still where nothing pulls never gets there.
+            # A particle at rest without gravity never gets there.
             return ahead + HAIR * self.radius / pace if pace else inf
         if not (hollow := self.hollow(x)):
             return falls(gap, rate, pull)
@@ -245,7 +246,7 @@ class Flight(NamedTuple):
 
     def at(self, after: float) -> tuple[Vec2d, Vec2d]:
         """Return place (m) and velocity (m/s) after a time (s)."""
-        # Number by number: operators of Vec2d take ten times as long.
+        # In plain numbers, as operators of Vec2d take ten times as long.
         (x, y), (vx, vy), (gx, gy) = self
         half = 0.5 * after
         place = Vec2d(x + after * (vx + half * gx), y + after * (vy + half * gy))
@@ -281,12 +282,12 @@ def falls(gap: float, rate: float, pull: float) -> float:
 
 
 class World:
-    """A Space with all surfaces of a machine, counted from near its place (`recorder.origin`).
+    """A Space with all surfaces of a machine, relative to `recorder.origin`.
 
     `faces` are its segments, in their order, the pulley, the arcs and their ends, as one particle
-    meets them; `gates` tells whether some are not there all the time. Gaps up to `hair` (m) are
-    contact, and gaps of `rounding` (m) are none. `tiny` is the share of speeds below which one into
-    a surface is rounding, which tilts normals.
+    meets them; `gates` says whether some do not always exist. Gaps up to `hair` (m) are contact,
+    and gaps of `rounding` (m) count as 0. `tiny` is the share of speeds below which a normal
+    velocity is rounding, because normals are tilted by rounding.
     """
 
     def __init__(self, machine: Machine, particle: int = 0) -> None:
@@ -322,7 +323,7 @@ class World:
         self.gates = any(face.appears > -inf or face.vanishes < inf for face in self.faces)
 
     def _about(self, parts: Segments | Arcs, n: int) -> dict[str, Any]:
-        """Return what a face knows of a segment or arc; pair values are (S,), or (K, S)."""
+        """Return the values of a face for a segment or arc; pair values are (S,), or (K, S)."""
         several = len(self.machine.pair_restitution) > 1
         at = (self.machine.releases.kind[self.particle], n) if several else n
         return {
@@ -337,7 +338,7 @@ class World:
     def _bend(
         self, n: int, center: Vec2d, ends: list[tuple[Floats, Floats]], about: dict[str, Any]
     ) -> None:
-        """Add an arc, and its ends (m), each with the way into the arc there."""
+        """Add an arc and its ends (m), each with the direction into the arc."""
         arcs = self.machine.arcs
         radius, begin, extent = (float(of[n]) for of in (arcs.radius, arcs.begin, arcs.extent))
         body = pymunk.Body(body_type=pymunk.Body.STATIC)
@@ -347,16 +348,16 @@ class World:
         circle = pymunk.Circle(body, radius)
         circle.cache_bb()
         base = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-        base.position = center  # feet in one place would all be pairs in every step
+        base.position = center  # points in one place would all be pairs in every step
         foot = pymunk.Circle(base, 0.0)
         about["spin"] = -about["speed"] / radius
         if extent >= 2.0 * pi:
             about |= {"begin": 0.0, "extent": inf}
             self._add(Bend(circle, tangent=None, foot=foot, crowns=NONE, **about))
             return
-        # Of the centre's way there, which bends no more than the sharpest arc.
+        # rad; extension of the arc at an end, see `JOINT`, for the sharpest arc.
         more = sqrt(2.0 * JOINT * self.hair * float(arcs.radius.min())) / (radius + self.radius)
-        # Where another piece goes on from the end, turning by less than that.
+        # Whether another piece continues from the end, turning by less than that.
         before, after = (
             more if (np.hypot(*(self._from(end.tolist())[0] + inward).T) <= more).any() else 0.0
             for end, inward in ends
@@ -365,7 +366,7 @@ class World:
             circle, tangent=None, foot=foot, begin=begin - before, extent=extent + before + after,
             crowns=NONE, **about,
         ))  # fmt: skip
-        # Out of it is along the surface at the first end, against it at the last.
+        # The outward direction is along the surface at the first end, against it at the last.
         for (place, inward), way in zip(ends, (1.0, -1.0), strict=True):
             end = place.tolist()
             still = pymunk.Body(body_type=pymunk.Body.STATIC)
@@ -379,9 +380,9 @@ class World:
 
     @cached_property
     def _onward(self) -> tuple[list[list[float]], Floats, Floats]:
-        """Ends of all pieces from left to right, n of [x, y], m, and the ways on into each.
+        """Ends of all pieces by x, n of [x, y], m, and the continuation into each piece.
 
-        These are directions, (n, 2), and curvatures, (n,), 1/m, > 0 to the left.
+        Continuations are directions, (n, 2), and curvatures, (n,), 1/m, positive to the left.
         """
         sides = [
             (end, way, turn / part.radius if isinstance(part, Arcs) else np.zeros(len(end)))
@@ -393,19 +394,19 @@ class World:
         return ends[order].tolist(), ways[order], bends[order]
 
     def _from(self, end: Sequence[float]) -> tuple[Floats, Floats]:
-        """Return the ways on, as of `_onward`, into all pieces that end in a place (m)."""
+        """Return the continuations, as in `_onward`, into all pieces that end at a place (m)."""
         (ends, ways, bends), (x, y) = self._onward, end
         low, high = (bisect_left(ends, [x + share * self.hair]) for share in (-1.0, 1.01))
         near = [n for n in range(low, high) if dist(ends[n], (x, y)) <= self.hair]
         return ways[near], bends[near]
 
     def _crown(self, end: Sequence[float], out: Vec2d, bend: float = 0.0) -> Vec2d:
-        """Return the way to the middle of the half of an end's rim that goes on from a left side.
+        """Return the direction to the middle of the rim that continues a left side.
 
-        That is the side of the way out of a piece, which bends by so much (1/m) on the way back. At
-        a free end it is the left normal. Where others end, a disk rolls round the end only in the
-        angle between two pieces that is more than π: all of that rim goes on from the side of
-        either that faces it.
+        It is the left side seen outward from a piece, which has the curvature `bend` (1/m)
+        backward. At a free end the direction is the left normal. Where other pieces end, a disk
+        rolls round the end only in an angle of more than π between two pieces; all of that rim
+        continues the faces of both.
         """
         ways, bends = self._from(end)
         if len(ways) == 1:
@@ -442,12 +443,12 @@ class World:
         return body, circle
 
     def heft(self, particle: int) -> tuple[float, float]:
-        """Return mass (kg) and moment of inertia (kg m²), inf of what does not turn."""
+        """Return mass (kg) and moment of inertia (kg m²), inf without rotation."""
         own = self.machine.particle.of(particle)
         return float(own.mass), float(own.inertia) or inf
 
     def curved(self, face: Face, x: Vec2d) -> bool:
-        """Tell whether what is nearest of a surface is an arc, the pulley or the end of a face."""
+        """Whether the nearest part of a surface is an arc, the pulley or the end of a face."""
         if not face.ends:
             return True
         point = face.shape.point_query(x).point
@@ -457,12 +458,12 @@ class World:
         self, path: Flight | Carriage, face: Face, span: float, leaving: bool = False,
         begin: float = 0.0, near: tuple[float, Vec2d] | None = None,
     ) -> float:  # fmt: skip
-        """Return after what time (s) a disk on a path meets a surface, inf if not within `span`.
+        """Return the time (s) at which a disk on a path meets a surface, inf if not within `span`.
 
-        It goes on by the times in which surely nothing is met, see `Face.free`: that never passes a
-        contact, and converges like Newton's method. A surface that is being left along its tangent
-        gives no bound; it is looked at after times that grow by half. `near` is its gap and normal
-        where the path begins, if they are known.
+        It advances by times within which nothing can be met, see `Face.free`. That never passes a
+        contact, and converges like Newton's method. A surface that is left along its tangent gives
+        no bound; it is checked after times that grow by half. `near` is its gap and normal at the
+        beginning, if known.
         """
         r, g, hair = face.radius, self.machine.gravity, self.hair
         t = last = begin
@@ -476,7 +477,8 @@ class World:
                     return bisected(lambda t: face.gap(path.at(t)[0])[0] < -0.5 * hair, last, t)[0]
                 leaving = gap <= hair and (rate <= slow or rate * rate <= 2.0 * LOW * g * hair)
             elif gap <= self.rounding or (gap <= hair and abs(rate) <= slow):
-                # A hair deep or less a curve is grazed, not met; nor is what runs alongside.
+                # A curve that is entered by at most a hair is grazed, not met; nor is a surface
+                # alongside met.
                 graze = v.length * sqrt(2.0 * hair / r)
                 if rate < -slow and (rate < -graze or not self.curved(face, x)):
                     return t
@@ -491,9 +493,9 @@ class World:
             last, t = t, min(t + tau, span)
 
     def clear(self, path: Flight | Carriage, face: Face, span: float, begin: float = 0.0) -> float:
-        """Return when (s) a disk on a path is clear of what spares it, at most `span`.
+        """Return the time (s) when a disk is clear of a face that ignores it, up to `span`.
 
-        It is looked for after each tenth of a radius' way.
+        It is checked after each tenth of a radius.
         """
         t = begin
         while t < span:
@@ -504,7 +506,7 @@ class World:
         return span
 
     def meets_gate(self, path: Flight | Carriage, face: Face, span: float, t: float) -> float:
-        """Return what `meets` does of a path that begins at a time (s), while the face is there."""
+        """Return `meets` for a path that begins at a time (s), while the face exists."""
         begin, span = max(face.appears - t, 0.0), min(span, face.vanishes - t)
         if begin > 0.0:
             begin = self.clear(path, face, span, begin)
@@ -516,9 +518,9 @@ class World:
 
 
 class Carriage:
-    """Ride of one particle at the belt's speed, not turning, at the height it is released at.
+    """Ride of one particle at the belt's speed, without rotation, at its height of release.
 
-    It begins at `t` (s), comes to the pulley at `top`, at the angle -β from its axis, and lasts
+    It begins at `t` (s), comes to the pulley at `top`, at the angle -β from the top, and lasts
     `until` separation: there if v² ≥ g ρ cos β, else at cos φ1 = v²/(g ρ); or until another surface
     is met; or to the end of the run.
     """
@@ -529,7 +531,7 @@ class Carriage:
         self.particle, self.surface, self.t = particle, machine.pulley.surface, t
         self.mass, self.g = float(machine.particle.of(particle).mass), machine.gravity
         self.weight, self.radius = self.mass * self.g, machine.pulley.radius
-        # Along the belt and square to it.
+        # Along the belt and perpendicular to it.
         self.along = Vec2d(cos(self.incline), sin(self.incline))
         self.up = self.along.perpendicular()
         place = Vec2d(*start.position[particle].tolist())
@@ -566,7 +568,7 @@ class Carriage:
         return -(self.speed**2) / self.rho
 
     def write(self, recorder: Recorder, end: float) -> None:
-        """Write the knots up to a time (s), with what the belt pays: it lets the particle down."""
+        """Write the knots up to a time (s), with the belt's work, which is negative going down."""
         turn = self.speed / self.rho * max(end - self.top, 0.0)
         round_it = np.linspace(self.top, end, ceil(turn / ARC) + 1).tolist() if turn else []
         for t in (self.t, *round_it, end):
@@ -579,14 +581,14 @@ class Carriage:
                 self.height, self.written = x.y, t
 
     def foot(self, t: ArrayLike) -> tuple[Floats, Floats]:
-        """Return where on the belt it lies at times (s), (2, ...) m, and the normal there."""
+        """Return its contact points on the belt at times (s), (2, ...) m, and the normals there."""
         way = self.x + self.speed * (np.asarray(t) - self.t)
         angle = np.maximum(way, 0.0) / self.rho - self.incline
         normal, back = np.stack([np.sin(angle), np.cos(angle)]), np.minimum(way, 0.0)
         return self.radius * normal + np.multiply.outer(self.along, back), normal
 
     def _bear(self, bins: Bins, begin: float, end: float) -> None:
-        """Count what the belt bears between two times (s)."""
+        """Count the belt's load between two times (s)."""
         times = np.linspace(begin, end, ceil((end - begin) / bins.every) + 1)
         span = np.diff(times)
         x, y = self.mass * self.speed * np.diff(self.foot(times)[1])

@@ -1,13 +1,13 @@
-"""What a piece of a surface is, straight or bent: the one place that says what its shape means.
+"""The geometry of a piece of a surface, straight or bent, in one place.
 
-Nearest point, gap, normal, ends, box, and the path to draw it: for what draws machines, says where
-their parts are, and checks runs. An engine must not use it to find a contact, nor may the core to
-judge a run (`barriers.c`): each has detection of its own, so that none of them, nor a check made
-of this, repeats another's mistake.
+Nearest point, gap, normal, ends, box, and the path to draw it: for drawing machines, describing
+their parts, and checking runs. Engines must not use it to find a contact, nor the core to judge a
+run (`barriers.c`): each has its own detection, so that none of them, nor a check that uses this
+module, repeats another's mistake.
 
-Arrays are of S pieces, (S,), and vectors (S, 2), in a family (N, S) and (N, S, 2); `Pieces.of`
-picks some of them, or one. Places (..., 2) are broadcast against the pieces: many places (c, 2)
-against one piece, or each against its own.
+Arrays of S pieces are (S,), and vectors (S, 2), in a family (N, S) and (N, S, 2); `Pieces.of` picks
+some of them, or one. Places (..., 2) are broadcast against the pieces: many places (c, 2) against
+one piece, or each against its own.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 from chutelab.util.arrays import Bools, Floats, Ints, sin_cos
 
 FINE = radians(3.0)
-"""Between two points of a path to draw: it is off by 3e-4 of the radius of curvature at most."""
+"""rad between two points of a path to draw, which is then off by at most 3e-4 of the radius."""
 
 VECTORS = {"start", "tangent", "center"}
 """Fields with two components, the last axis."""
@@ -33,7 +33,7 @@ VECTORS = {"start", "tangent", "center"}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Pieces(ABC):
-    """What S pieces of surfaces have, whatever their shape: read-only arrays.
+    """S pieces of surfaces, whatever their shape: read-only arrays.
 
     Attributes
     ----------
@@ -44,9 +44,9 @@ class Pieces(ABC):
     surface : ndarray, (S,)
         Index of the surface a piece belongs to, into `Machine.surfaces`.
     appears, vanishes : ndarray, (..., S)
-        From when to when it is there, s; -inf and inf if always.
+        Time span in which it exists, s; -inf and inf if always.
     one_sided : ndarray, (S,)
-        1 if it is solid on its left, of an arc outside, -1 on the other side; 0 on both.
+        1 if it is solid only on its left (an arc: outside), -1 only on the other side; 0 on both.
     """
 
     speed: Floats
@@ -63,7 +63,7 @@ class Pieces(ABC):
                 array.flags.writeable = False
 
     def of(self, which: Any) -> Self:
-        """Return some of the pieces, or one, of numbers instead of arrays, by their numbers.
+        """Return some pieces by their numbers, or a single one with numbers instead of arrays.
 
         One of a family is an array of those of its machines; what these have alike stays.
         """
@@ -76,27 +76,27 @@ class Pieces(ABC):
 
     @property
     def gate(self) -> Bools:
-        """Which are not always there."""
+        """Which do not always exist."""
         return np.isfinite(self.appears) | np.isfinite(self.vanishes)
 
     def there(self, t: Any, late: float = 0.0) -> Bools:
-        """Tell whether it is there at times (s), or was until no longer than `late` (s) ago."""
+        """Whether it exists at times (s), or did until at most `late` (s) before."""
         return np.asarray((self.appears <= t) & (t < self.vanishes + late))
 
     @property
     @abstractmethod
     def way(self) -> Floats:
-        """How long each is, m."""
+        """Length of each, m."""
 
     @property
     @abstractmethod
     def whole(self) -> Bools:
-        """Which go all round, without ends."""
+        """Which are whole circles, without ends."""
 
     @property
     @abstractmethod
     def ends(self) -> tuple[Floats, Floats]:
-        """First and last point, (..., S, 2) each, m; one and the same of what is `whole`."""
+        """First and last point, (..., S, 2) each, m; equal for those that are `whole`."""
 
     @property
     @abstractmethod
@@ -111,11 +111,11 @@ class Pieces(ABC):
     @property
     @abstractmethod
     def corners(self) -> Floats:
-        """Points of each that its narrowest box goes through, (..., C, 2), m."""
+        """Points of each that span its bounding box, (..., C, 2), m."""
 
     @abstractmethod
     def away(self, places: Floats) -> Floats:
-        """Return the way to places from the nearest points, (..., 2), m."""
+        """Return the vectors to places from the nearest points, (..., 2), m."""
 
     @abstractmethod
     def normal(self, places: Floats) -> Floats:
@@ -123,23 +123,23 @@ class Pieces(ABC):
 
     @abstractmethod
     def at(self, way: ArrayLike) -> Floats:
-        """Return the points of one piece so far (m) along it, where a positive speed leads."""
+        """Return the points of one piece at distances (m) along its direction of motion."""
 
     @abstractmethod
     def along(self, places: Floats) -> Floats:
-        """Return how far (m) along one piece the points nearest to places are, as `at` has it."""
+        """Return the distances (m) along one piece of the points nearest to places; see `at`."""
 
     @abstractmethod
     def path(self) -> Floats:
-        """Return the points (P, 2) through which to draw one piece, m, as `at` has them."""
+        """Return the points (P, 2) through which to draw one piece, m, in the order of `at`."""
 
     @abstractmethod
     def told(self) -> dict[str, Floats]:
-        """Return the numbers (..., S) that say where they are, under the core's names."""
+        """Return the numbers (..., S) of their places, by the core's names."""
 
     @abstractmethod
     def where(self) -> str:
-        """Say where one piece is."""
+        """Describe the place of one piece."""
 
     def nearest(self, places: Floats) -> Floats:
         """Return the nearest points to places, (..., 2), m."""
@@ -220,7 +220,7 @@ class Segments(Pieces):
         }  # fmt: skip
 
     def where(self) -> str:
-        # Rounding leaves 1e-17 where 0 is meant.
+        # Rounding leaves 1e-17 instead of 0.
         (x0, y0), (x1, y1) = np.round(self.ends, 12) + 0.0
         return f"from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m"
 
@@ -273,7 +273,7 @@ class Arcs(Pieces):
 
     @property
     def boxes(self) -> tuple[Floats, Floats]:
-        # Of the whole circle: it is needed of thousands, and only to tell what may be near.
+        # Box of the whole circle: it is needed for thousands, only to find what may be near.
         reach = self.radius[..., None]
         return self.center - reach, self.center + reach
 
@@ -281,14 +281,14 @@ class Arcs(Pieces):
     def corners(self) -> Floats:
         quarters = 0.5 * pi * np.arange(4)[:, None]
         reach = np.mod(quarters - self.begin[..., None, :], 2.0 * pi)
-        # Where a quarter is not on the arc, its first end instead.
+        # If a quarter point is not on the arc, use its first end.
         inside = reach <= self.extent[..., None, :]
         angle = np.where(inside, self.begin[..., None, :] + reach, self.begin[..., None, :])
         points = [self.point(quarter) for quarter in np.moveaxis(angle, -2, 0)]
         return np.concatenate([*points, *self.ends], axis=-2)
 
     def _turned(self, out: Floats) -> Floats:
-        """Return how far ways from the centres are turned from the first ends, 0 to 2π, rad."""
+        """Return the angles of vectors from the centres, from the first ends on, 0 to 2π, rad."""
         return np.asarray(np.mod(np.arctan2(out[..., 1], out[..., 0]) - self.begin, 2.0 * pi))
 
     def away(self, places: Floats) -> Floats:
@@ -305,12 +305,12 @@ class Arcs(Pieces):
 
     def normal(self, places: Floats) -> Floats:
         x, y = np.moveaxis(places - self.center, -1, 0)
-        # All of it is as far from its centre: any will do.
+        # Seen from the centre all points are equally far, so any direction will do.
         x = np.where(np.hypot(x, y) > 0.0, x, 1.0)
         return np.asarray(np.stack([x, y], axis=-1) / np.hypot(x, y)[..., None])
 
     def holds(self, place: Floats, near: float) -> Bools:
-        """Tell whether points of the circles (..., 2) are on the arcs, not `near` (m) an end."""
+        """Whether points of the circles (..., 2) are on the arcs, and not `near` (m) an end."""
         way = self.radius * self._turned(place - self.center)
         return np.asarray(self.whole | ((way > near) & (way < self.way - near)))
 
@@ -320,7 +320,7 @@ class Arcs(Pieces):
 
     def along(self, places: Floats) -> Floats:
         turned = self._turned(places - self.center)
-        # Beyond both ends the nearer one, 0 the last.
+        # Beyond both ends the nearer one; a distance of 0 is the last end.
         nearer_first = turned > 0.5 * self.extent + pi
         turned = np.where(nearer_first, 0.0, np.minimum(turned, self.extent))
         return np.asarray(self.radius * (self.extent - turned))
@@ -343,22 +343,23 @@ class Arcs(Pieces):
 
 
 KINDS: dict[str, type[Segments] | type[Arcs]] = {"Segment": Segments, "Arc": Arcs}
-"""Each kind of piece by the name of the core's rows, which with an s is that of the part of a
-`Machine` in small letters."""
+"""Each kind of piece by the name of the core's rows; in small letters and with an s it is the name
+of the part of a `Machine`."""
 
 TOUCHES = 1e-9
-"""Share of the machine's size by which an arc and another piece must cross; joints only touch."""
+"""Share of the machine's size by which an arc and another piece must overlap to cross; joints only
+touch."""
 
 
 def crossings(names: int, segments: Segments, arcs: Arcs) -> list[tuple[int, int]]:
-    """Return the numbers of every two of so many surfaces that cross, the lower one first.
+    """Return the pairs of surfaces that cross, by their numbers, the lower one first.
 
-    Those that only touch, as at a shared end, do not; nor do gates cross what is never there while
-    they are.
+    Surfaces that only touch, as at a shared end, do not cross, nor do gates and surfaces that never
+    exist at the same time.
     """
     rows = np.concatenate(segments.ends, axis=1)
     found: dict[tuple[int, int], None] = {}
-    known = np.eye(names, dtype=bool)  # surfaces that need not be held against each other
+    known = np.eye(names, dtype=bool)  # pairs of surfaces that need not be compared
 
     def note(pairs: Ints) -> None:
         found.update(dict.fromkeys(map(tuple, pairs.tolist())))
@@ -384,15 +385,15 @@ def crossings(names: int, segments: Segments, arcs: Arcs) -> list[tuple[int, int
 
 
 ABREAST = 256
-"""Pieces that are held against all others together, so that their pairs fit into memory."""
+"""Pieces that are compared with all others at once, so that the pairs fit into memory."""
 
 
 def _beside(
     one: Segments | Arcs, other: Segments | Arcs, known: Bools
 ) -> Iterator[tuple[Ints, Ints]]:
-    """Yield pairs of pieces, by numbers, whose boxes touch while both are there.
+    """Yield pairs of pieces, by numbers, whose boxes touch while both exist.
 
-    Pieces of surfaces that are known to cross, (surfaces, surfaces), are left out.
+    Pairs of surfaces that are known to cross, (surfaces, surfaces), are left out.
     """
     (low, high), (low2, high2) = one.boxes, other.boxes
     for first in range(0, len(one.surface), ABREAST):
@@ -408,7 +409,7 @@ def _beside(
 
 
 def _chords(segments: Segments, which: Ints, arcs: Arcs, near: float) -> Bools:
-    """Tell which segments, by their numbers (n,), cross n arcs by more than `near` (m)."""
+    """Return which of the segments, by numbers (n,), cross n arcs by more than `near` (m)."""
     start, tangent = segments.start[which], segments.tangent[which]
     away = arcs.center - start
     foot = (away * tangent).sum(axis=-1)
@@ -422,7 +423,7 @@ def _chords(segments: Segments, which: Ints, arcs: Arcs, near: float) -> Bools:
 
 
 def _lenses(first: Arcs, second: Arcs, near: float) -> Bools:
-    """Tell of which pairs (n,) the left one of both crossings is on both arcs, by `near` (m)."""
+    """Return for which pairs (n,) the left crossing is on both arcs, by `near` (m)."""
     distance = np.hypot(*(second.center - first.center).T)
     crossed = (distance < first.radius + second.radius - near) & (
         distance > np.abs(first.radius - second.radius) + near
@@ -431,7 +432,7 @@ def _lenses(first: Arcs, second: Arcs, near: float) -> Bools:
     first, second, distance = first.of(some), second.of(some), distance[some]
     towards = (second.center - first.center) / distance[:, None]
     aside = np.stack([-towards[:, 1], towards[:, 0]], axis=-1)
-    # The other way round it is the other crossing.
+    # With the arcs swapped it is the other crossing.
     a, b = first.radius, second.radius
     foot = 0.5 * (distance + (a - b) * (a + b) / distance)
     half = np.sqrt(np.maximum(a**2 - foot**2, 0.0))
@@ -441,7 +442,7 @@ def _lenses(first: Arcs, second: Arcs, near: float) -> Bools:
 
 
 def _parts(line: Floats, ends: Floats) -> Bools:
-    """Tell of pairs (n, 4) whether two ends lie strictly on two sides of a line."""
+    """Return for pairs (n, 4) whether two ends lie strictly on different sides of a line."""
     (x0, y0, x1, y1), (u0, v0, u1, v1) = line.T, ends.T
     first = (x1 - x0) * (v0 - y0) - (y1 - y0) * (u0 - x0)
     second = (x1 - x0) * (v1 - y0) - (y1 - y0) * (u1 - x0)

@@ -1,21 +1,22 @@
-"""What a run leaves behind, and how it is read.
+"""The results of a run, and everything that is computed from them.
 
-- `record`: `Record`, a finished run: knots, events, and the ledger entries they carry.
-- `recorder`: what engines write a run into.
-- `ledger`: where the energy went, in total and by surface, up to any time.
-- `arrival`: which particles have come to a surface, or to what lies on it.
-- `quantities`: the readers of the registry, a run's numbers by name and by particle; the paper's
-  symbols; particle 0 and the theory.
+- `record`: `Record`, a finished run: knots, events, and their ledger entries.
+- `recorder`: collects a run while an engine writes it.
+- `ledger`: the energy ledger, in total and by surface, up to any time.
+- `arrival`: arrivals on a surface or on what lies on it; fates of particles.
+- `quantities`: the readers of the registry: a run's numbers by name and by particle; the paper's
+  symbols; particle 0 beside the theory.
 - `stream`: a stream as a whole: flow, fates, steady power, the envelope of its paths.
-- `laws`: what every run is judged by.
-- `sensors`: what passes lines across a stream; `loads`: what surfaces bear, in bins of time;
-  `wear`: what strikes and rubs them, piece by piece; `fields`: a crowd as a continuum, on a grid.
+- `laws`: the laws by which every run is judged.
+- `sensors`: passages through lines across a stream; `loads`: loads on surfaces in bins of time;
+  `wear`: impacts and sliding on surfaces, piece by piece; `fields`: a crowd as a continuum, on a
+  grid.
 - `summary`: notes, tables, and the JSON object of ``chutelab run --json``.
 - `storage`: recordings as files; `packing`: those of large crowds.
 
-A `Recording` is a record with all that is read off it as its own properties and methods. The
-readers import `Record`, so that no circle of imports arises, and are imported when they are first
-asked for: most runs need few of them.
+A `Recording` is a record with these readers as its properties and methods. The readers import
+`Record`, so that there is no circle of imports, and are imported when they are first needed: most
+runs need few of them.
 """
 
 from __future__ import annotations
@@ -62,28 +63,28 @@ class Recording(Record):
 
     @classmethod
     def of(cls, record: Record) -> Recording:
-        """Return a record as a recording; they share their arrays, and what was found in them."""
+        """Return a record as a recording; they share their arrays and cached results."""
         recording = object.__new__(cls)
         recording.__dict__.update(record.__dict__)
         return recording
 
     @property
     def prediction(self) -> Transfer:
-        """What the theory predicts for the scene, see `chutelab.theory.predict`."""
+        """The theory's prediction for the scene, see `chutelab.theory.predict`."""
         from chutelab.results.quantities import prediction
 
         return prediction(self)
 
     @property
     def laws(self) -> tuple[Broken, ...]:
-        """The laws of every run that this one breaks, empty if it keeps all; see `results.laws`."""
+        """The laws that this run breaks, empty if it keeps all; see `results.laws`."""
         from chutelab.results.laws import judge
 
         return judge(self)
 
     @property
     def ledger(self) -> Ledger:
-        """Where the energy went, in total and by surface; see `results.ledger.Ledger`."""
+        """The energy ledger, in total and by surface; see `results.ledger.Ledger`."""
         from chutelab.results.ledger import ledger
 
         return ledger(self)
@@ -101,7 +102,7 @@ class Recording(Record):
         return measure(self, quantity)
 
     def loads(self, surface: str, *, every: float | None = None) -> Load:
-        """Return what a surface bears over time, see `results.loads`; needs ``run.loads``."""
+        """Return the load on a surface over time, see `results.loads`; needs ``run.loads``."""
         from chutelab.results.loads import loads
 
         return loads(self, surface, every)
@@ -114,7 +115,7 @@ class Recording(Record):
         erosion: float | None = None,
         abrasion: float | None = None,
     ) -> Wear:
-        """Return what strikes and rubs a surface, piece by piece; see `results.wear.worn`."""
+        """Return the wear of a surface, piece by piece; see `results.wear.worn`."""
         from chutelab.results.wear import worn
 
         return worn(self, surface, pieces, erosion=erosion, abrasion=abrasion)

@@ -2,11 +2,11 @@
 
 A particle *arrives* on a surface when it first touches it, or touches what lies on it. What lies on
 a surface at an instant is found from the places of all particles: those that touch it, those that
-touch these, and so on. A particle that has bounced off lies on nothing: one that it meets in the
-air has not arrived by that. Where particles do not meet each other, to arrive is to touch the
+touch these, and so on. A particle that has bounced off does not lie on the surface, and one that it
+meets in the air has not arrived. If particles do not meet each other, to arrive is to touch the
 surface itself.
 
-The fate of a particle is where it is when its track ends, or by which way it has left.
+The fate of a particle is its place when its track ends, or the way by which it has left.
 """
 
 from __future__ import annotations
@@ -21,32 +21,32 @@ from chutelab.results.record import EVENT, PARTICLES, Kind, Record, hermite, kep
 from chutelab.util.arrays import Bools, Floats, Ints, put
 
 TOUCH = 0.01
-"""Gap, as a share of the smaller radius, up to which two touch: twice what the contact engine
-lets a contact open that lasts, ten times what the pymunk engine lets them overlap."""
+"""Gap, as a share of the smaller radius, up to which two touch: twice the largest gap of a lasting
+contact in the contact engine, ten times the overlap that the pymunk engine allows."""
 
 POINT = 1e-9
 """Distance up to which a mass point touches a surface, as a share of the size of the machine."""
 
 CARRIED = 1e-3
-"""m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
+"""m/s; a particle whose speed differs from the belt's by less rides with it: the slip counts as
+none."""
 
 LOOKS = 100
-"""Evenly spaced instants, besides impacts, at which particles that lie on a surface are found."""
+"""Evenly spaced times, besides impacts, at which particles that lie on a surface are searched."""
 
 HALVINGS = 24
-"""Bisections between two such instants, to find when a contact began."""
+"""Bisections between two such times to find when a contact began."""
 
 
 def fates(recording: Record) -> NDArray[Any]:
-    """Return what became of each particle, in words, (N,); each has one fate.
+    """Return the fate of each particle, in words, (N,).
 
     ``on NAME``
-        It touches a surface when its track ends, or lies on what does, or is carried by it in a
-        bed; where these are several, the one that is fewest contacts away, and of these the belts
-        first.
+        It touches a surface when its track ends, or lies on particles that do, or is carried by it
+        in a bed. Of several surfaces the one that is fewest contacts away counts, belts first.
     ``off NAME left``, ``off NAME right``
-        It came to a belt (not the incoming one), has left the scene, and met no other surface
-        between: carried off, at the end of the belt that was nearer when it fell below the belt.
+        It came to a belt (not the incoming one) and has left the scene without meeting another
+        surface: carried off, over the end of the belt that was nearer when it fell below the belt.
     ``fell left``, ``fell right``, ``fell below``, ``flew above``
         It has left the scene otherwise: beside the machine, below it, or (without gravity) above.
     ``in the air``
@@ -85,7 +85,7 @@ def fates(recording: Record) -> NDArray[Any]:
                 new = (before[a] >= 0) & (before[b] < 0)
                 home[b[new]] = before[a[new]]
     if machine.releases.carried.any():
-        # In its bed a particle is carried at its height, whatever it touches.
+        # In a bed a particle is carried at its height, whatever it touches.
         rides = machine.releases.carried.copy()
         rides[recording.select(Kind.SEPARATION, surface="incoming")["particle"]] = False
         home[rides[stays] & ~recording.ended_by("landed")[stays]] = names.index("incoming")
@@ -111,7 +111,7 @@ def moving(machine: Machine) -> dict[str, Bools]:
 
 
 def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
-    """Return by which way particles have left the scene that end outside of it, (n, 2), m."""
+    """Return the way by which particles have left that end outside the scene, (n, 2), m."""
     machine = recording.machine
 
     def box(points: Floats) -> list[Floats]:
@@ -126,7 +126,7 @@ def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
     high = np.where((y > top) & (machine.gravity == 0.0), "flew above", "fell below")
     said = np.where(x < left, "fell left", np.where(x > right, "fell right", high)).astype(object)
     touch = recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
-    # Rows are in the order of time: the last one of a particle stays.
+    # Rows are in the order of time, so the last one of a particle remains.
     met, when = np.full(recording.count, -1), np.full(recording.count, -np.inf)
     met[touch["particle"]], when[touch["particle"]] = touch["surface"], touch["t"]
     others = recording.surface_index(PARTICLES)
@@ -154,7 +154,7 @@ def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
 
 
 def never(count: int) -> NDArray[Any]:
-    """Return events (count,) that did not happen: NaN throughout."""
+    """Return events (count,) that did not happen: all NaN."""
     events = np.zeros(count, dtype=EVENT)
     for name in EVENT.names or ():
         if EVENT[name].base.kind == "f":
@@ -164,15 +164,15 @@ def never(count: int) -> NDArray[Any]:
 
 @kept
 def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
-    """Return how each particle first came to a surface, (N,), dtype `EVENT`; NaN where none did.
+    """Return each particle's arrival on a surface, (N,), dtype `EVENT`; NaN without one.
 
-    Of the fields only time, place, the velocity before and `other` (the particle that it met, -1
-    for the surface itself) say something of an arrival on what lies there. Not of a family.
+    For an arrival on other particles only time, place, the velocity before and `other` (the
+    particle that it met, -1 for the surface itself) are meaningful. Not for a family.
     """
     found = never(recording.count)
     if surface not in recording.surfaces:
         return found
-    # All events on it: a particle that slides on to it from a tangential chute has no impact.
+    # All events on it count: a particle that slides onto it from a tangential chute has no impact.
     direct = recording.select(surface=surface)
     if not recording.machine.interact:
         own = recording.first(direct)
@@ -194,7 +194,7 @@ def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
         if come.all():
             break
         now = int(np.searchsorted(times, look, side="right"))
-        # Blows between two that have arrived change nothing.
+        # Impacts between two that have arrived change nothing.
         between = np.arange(last, now)
         between = between[~(come[one[between]] & come[two[between]] & (two[between] >= 0))]
         some = (between, times[between], one[between], two[between])
@@ -219,7 +219,7 @@ def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
 
 
 class Places:
-    """Where particles are at an instant, and what of them lies on a surface then."""
+    """Places of particles at an instant, and which of them lie on a surface then."""
 
     def __init__(self, recording: Record) -> None:
         self.recording = recording
@@ -247,7 +247,7 @@ class Places:
         return left, np.clip(share, 0.0, 1.0)
 
     def at(self, t: float, particles: Ints | None = None) -> tuple[Ints, Floats]:
-        """Return particles under way at t, of some or all, and places, (n,) and (n, 2), m."""
+        """Return the particles under way at t and their places, (n,) and (n, 2), m."""
         knots, offsets = self.recording.knots, self.recording.offsets
         particles = np.flatnonzero(self.recording.released) if particles is None else particles
         first, last = knots["t"][offsets[particles]], knots["t"][offsets[particles + 1] - 1]
@@ -255,11 +255,11 @@ class Places:
         return particles, self.on(particles, t)
 
     def on(self, particles: Ints, t: Any) -> Floats:
-        """Return where particles (n,) are at t, s, one or (n,), while under way, (n, 2), m."""
+        """Return the places of particles (n,) under way at t, s (one or (n,)), (n, 2), m."""
         return hermite(self.recording.knots, *self._cells(particles, t))[0]
 
     def belt_work(self, particles: Ints, t: Any) -> Floats:
-        """Return the belt work booked of particles (n,) up to t, s, one or (n,), (n,), J."""
+        """Return the belt work of particles (n,) up to t, s (one or (n,)), (n,), J."""
         knots, offsets = self.recording.knots["entries"][:, 0], self.recording.offsets
         left, share = self._cells(particles, t, "left")
         booked = knots[left] + share * (knots[left + 1] - knots[left])
@@ -276,9 +276,9 @@ class Places:
         return found
 
     def edges(self, particle: int, place: Floats, t: float) -> Segments:
-        """Return the edges of a particle that is at a place (2,), m, at t, s; of a disk its centre.
+        """Return the edges of a particle at a place (2,), m, at t, s; for a disk its centre.
 
-        That is one edge of no length.
+        The centre is one edge of no length.
         """
         angle, some = 0.0, self.recording
         corners = some.machine.outlines[some.machine.releases.kind[particle]]
@@ -299,7 +299,7 @@ class Places:
         )  # fmt: skip
 
     def bare(self, particles: Ints, places: Floats, surface: str, t: Any) -> Bools:
-        """Tell which particles touch a surface itself at t (s, one or (n,)), (n,)."""
+        """Return which particles touch a surface itself at t (s, one or (n,)), (n,)."""
         machine, owner = self.recording.machine, self.recording.surface_index(surface)
         gap, mover = np.full(len(particles), np.inf), self._movers.get(owner)
         if owner not in self._pieces:
@@ -318,7 +318,8 @@ class Places:
             edges = self.edges(int(particles[n]), places[n], float(times[n]))
             found[n] = False
             for piece in (one for one in self._pieces[owner] if one.there(times[n])):
-                # Nearest to each other are a corner and the piece, or an edge and an end or centre.
+                # The nearest points are on a corner and the piece, or on an edge and an end or
+                # centre.
                 to = np.stack([*piece.ends, *([piece.center] if isinstance(piece, Arcs) else [])])
                 to = to if mover is None else mover.carried(to, times[n])
                 near = np.concatenate([edges.start, *(edges.nearest(point) for point in to)])
@@ -327,7 +328,7 @@ class Places:
         return found
 
     def _meet(self, pair: Ints, places: Floats, t: float) -> bool:
-        """Tell whether two that may touch do so, of which one has corners, by places (2, 2), m."""
+        """Whether two near particles, one with corners, touch at places (2, 2), m."""
         a, b = (self.edges(int(k), place, t) for k, place in zip(pair, places, strict=True))
         gap = min(
             float(first.gap(second.start[:, None]).min()) for first, second in ((a, b), (b, a))
@@ -361,13 +362,13 @@ class Places:
         return one[met], two[met]
 
     def lying(self, t: float, particles: Ints, places: Floats, surface: str) -> Bools:
-        """Tell which particles lie on a surface at t (s), or on what lies on it, (n,)."""
+        """Return which particles lie on a surface at t (s), or on what lies on it, (n,)."""
         lies = self.bare(particles, places, surface, t)
         one, two = self.touching(particles, places, t)
         many = -1
         while (now := int(np.count_nonzero(lies))) > many:
             many = now
-            # A particle is in several pairs, of which any one counts.
+            # A particle may be in several pairs; any one counts.
             lies[one[lies[two]]] = True
             lies[two[lies[one]]] = True
         return lies
@@ -375,7 +376,7 @@ class Places:
     def carries(
         self, particle: int, t: float, particles: Ints, places: Floats, surface: str
     ) -> bool:
-        """Tell whether one of `particles` lies on a surface at t (s), or on what lies on it."""
+        """Whether one of `particles` lies on a surface at t (s), or on what lies on it."""
         radius = self.radius[particles]
         todo = np.flatnonzero(particles == particle).tolist()
         seen = np.zeros(len(particles), dtype=bool)
@@ -396,9 +397,9 @@ class Places:
         return False
 
     def began(self, particle: int, surface: str, before: float, after: float) -> NDArray[Any]:
-        """Return the state in which a particle that lies there `after` came there (s), as an event.
+        """Return when and how a particle that lies there `after` (s) arrived, as an event.
 
-        To a share of 2**-`HALVINGS` of the time between the two.
+        The time is found to 2**-`HALVINGS` of the interval between `before` and `after`.
         """
         for _ in range(HALVINGS):
             middle = 0.5 * (before + after)

@@ -2,8 +2,8 @@
 
 Coarse graining after I. Goldhirsch, Granular Matter 12 (2010) 239-252: each particle is spread by
 Lucy's kernel, w(d) = 5/(π c²) (1 + 3 d/c) (1 - d/c)³ for d < c, which ends at its width c; in two
-dimensions, of the slice that is simulated. On the grid the weights of a particle are made to sum
-up to 1, so no mass is lost to rounding of the grid. Means over a window of time.
+dimensions, for the slice that is simulated. On the grid the weights of each particle are normalised
+to the sum 1, so no mass is lost. Fields are means over a window of time.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from chutelab.util.files import whole
 from chutelab.util.tables import Sheet, Shown, number
 
 SAMPLES: Final = 50
-"""Times in the window at which tracks are looked at."""
+"""Times in the window at which tracks are sampled."""
 
 WIDE: Final = 3.0
-"""Width of the kernel in mean diameters, where none is asked for."""
+"""Default width of the kernel, in mean diameters."""
 
 FINE: Final = 4
-"""Cells to the width of the kernel, where nothing else is asked for."""
+"""Default number of cells per width of the kernel."""
 
 MOST_CELLS: Final = 1_000_000
 
@@ -40,7 +40,8 @@ CHUNK: Final = 500_000
 """Weights that are computed at once."""
 
 NODES: Final = 3
-"""Of Gauss's rule for the integral of the kernel along a branch, a third of its width: to 1e-4."""
+"""Nodes of Gauss's rule for the integral of the kernel along a branch of a third of its width: to
+1e-4."""
 
 SAME: Final[float] = number_of("SAME_IMPULSE")
 
@@ -48,7 +49,7 @@ NAMES: Final = {
     "density": "kg/m²", "vx": "m/s", "vy": "m/s", "speed": "m/s", "temperature": "m²/s²",
     "pressure": "N/m", "sxx": "N/m", "sxy": "N/m", "syx": "N/m", "syy": "N/m",
 }  # fmt: skip
-"""What there is on the grid, and its unit."""
+"""The fields on the grid, and their units."""
 
 
 def need_vtk() -> None:
@@ -59,7 +60,7 @@ def need_vtk() -> None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fields(Shown):
-    """Fields on a grid of square cells; their values are those at the middles.
+    """Fields on a grid of square cells, at the middles of the cells.
 
     Attributes
     ----------
@@ -72,22 +73,23 @@ class Fields(Shown):
     density : ndarray, shape (X, Y)
         ρ, of the slice, kg/m².
     velocity : ndarray, shape (2, X, Y)
-        V, mean momentum over mean density, m/s; NaN where there is nothing.
+        V, mean momentum over mean density, m/s; NaN where there are no particles.
     temperature : ndarray, shape (X, Y)
-        Half the mean square of what velocities are off V, m²/s²; NaN where there is nothing.
+        Half the mean square deviation of velocities from V, m²/s²; NaN where there are no
+        particles.
     kinetic : ndarray, shape (2, 2, X, Y)
         Kinetic stress, -Σ m w v' v', N/m; negative is compression.
     contact : ndarray, shape (2, 2, X, Y)
-        Of blows and, with ``run.stress``, of lasting contacts, -Σ J b ∫ w over the window's length:
-        J on a particle, b to its centre from that of the other or from where it meets a surface,
-        N/m.
+        Stress of impacts and, with ``run.stress``, of lasting contacts, -Σ J b ∫ w over the
+        window's length: J on a particle, b to its centre from that of the other or from the contact
+        point on a surface, N/m.
     traction : ndarray, shape (2, X, Y)
-        What surfaces give by these, Σ J w at the contact over the window's length, N/m².
+        Force of surfaces in these contacts, Σ J w at the contact over the window's length, N/m².
     left_out : float
         Share of the impulses on particles in the window that are not in contact stress and
         traction: those of lasting contacts, where the recording does not have them by pairs.
     joined : bool
-        Whether strings, rods, springs or pins pull: what these give is in no stress.
+        Whether there are strings, rods, springs or pins, whose forces are in no stress.
     """
 
     x: Floats
@@ -123,12 +125,12 @@ class Fields(Shown):
 
     @property
     def mass(self) -> float:
-        """The integral of the density, kg: the mean mass of what is inside."""
+        """The integral of the density, kg: the mean mass inside."""
         return float(self.density.sum()) * self.cell**2
 
     @property
     def note(self) -> str:
-        """What was averaged how, and what is left out."""
+        """How the fields were averaged, and what is left out."""
         begin, end = self.window
         said = (
             f"Lucy's kernel, width {number(self.width)} m, on cells of {number(self.cell)} m; mean"
@@ -144,7 +146,7 @@ class Fields(Shown):
         return said
 
     def sheet(self, *, details: bool = False) -> Sheet:
-        """Return least, mean and largest of each field where there is anything."""
+        """Return least, mean and largest value of each field."""
         some, rows = self.density > 0.0, []
         for name, unit in NAMES.items():
             values = self[name][some]
@@ -154,7 +156,7 @@ class Fields(Shown):
         return Sheet("Fields", ("", "least", "mean", "largest"), tuple(rows), notes=(self.note,))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON: how it was made, and least, mean and largest of each."""
+        """Return plain data for JSON: parameters, and least, mean and largest of each field."""
         some = self.density > 0.0
         told = {
             name: [float(of(self[name][some])) for of in (np.min, np.mean, np.max)]
@@ -167,7 +169,7 @@ class Fields(Shown):
         }  # fmt: skip
 
     def rows(self) -> Iterator[Sequence[object]]:
-        """Yield the rows of a table, a cell each, the names of its columns first."""
+        """Yield the rows of a table, one per cell, the names of the columns first."""
         yield "x", "y", *NAMES
         columns = [self[name].ravel().tolist() for name in NAMES]
         places = np.stack(np.meshgrid(self.x, self.y, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -214,7 +216,7 @@ class _Grid:
         self.stencil = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
 
     def add(self, sums: Floats, places: Floats, values: Floats) -> None:
-        """Add values (K, c), spread about places (c, 2), m, to sums (K, X, Y)."""
+        """Spread values (K, c) about places (c, 2), m, and add them to sums (K, X, Y)."""
         flat = sums.reshape(len(sums), -1)
         size = max(1, CHUNK // len(self.stencil))
         for begin in range(0, len(places), size):
@@ -256,12 +258,12 @@ def fields(
     cell : float, optional
         Edge of a cell, m; by default a quarter of the width.
     box : ((x, y), (x, y)), optional
-        Two corners of what the grid covers, m; by default all places of the window.
+        Two corners of the grid, m; by default it covers all places in the window.
 
     Raises
     ------
     InputError
-        If a number is out of its range, or nothing is there in the window.
+        If a number is out of its range, or no particle is there in the window.
     """
     if recording.family is not None:
         raise InputError("of a single scene, not of a family", "recording", recording.title)
@@ -314,7 +316,7 @@ def fields(
     blows = _blows(recording, begin, end)
     for given in (blows, _kept(recording, begin, end, samples)):
         given.spread(grid, contact, traction)
-    # What lasting contacts gave is there.
+    # The forces of lasting contacts are recorded.
     kept = recording.engine == "contact" and recording.machine.stress > 0.0
     return Fields(
         x=grid.low[0] + (np.arange(grid.shape[0]) + 0.5) * cell,
@@ -335,10 +337,10 @@ def fields(
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """What contacts gave: impulses (c, 2), N s, on particles at centers (c, 2), m.
+    """Forces in contacts: impulses (c, 2), N s, on particles at centers (c, 2), m.
 
-    Branches (c, 2), m, lead to them from the other's, or from places on surfaces (`on_surface`);
-    `stress` (c, 2, 2), N m s, is the sum of J b.
+    Branches (c, 2), m, lead to them from the other particle's centre, or from points on surfaces
+    (`on_surface`); `stress` (c, 2, 2), N m s, is the sum of J b.
     """
 
     center: Floats
@@ -363,10 +365,10 @@ class _Given:
 
 
 def _blows(recording: Record, begin: float, end: float) -> _Given:
-    """Return what blows gave in a window.
+    """Return the impulses of impacts in a window.
 
-    Where all that a particle touches was solved at once, its change is that of several impulses:
-    they are among what is kept of lasting contacts.
+    If all contacts of a particle were solved at once, its change is the sum of several impulses,
+    which are recorded with the lasting contacts.
     """
     some = recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
     some = some[(some["t"] >= begin) & (some["t"] < end)]
@@ -389,9 +391,9 @@ def _blows(recording: Record, begin: float, end: float) -> _Given:
 
 
 def _kept(recording: Record, begin: float, end: float, samples: int) -> _Given:
-    """Return what lasting contacts gave in a window, where it is kept.
+    """Return the impulses of lasting contacts in a window, if they are recorded.
 
-    Bins are evenly of the times in them; longer ones than a sample are seen at several times.
+    The impulse of a bin is spread evenly over it; bins longer than a sample count at several times.
     """
     rows = recording.lasting
     rows = rows[(rows["to"] > begin) & (rows["from"] < end) & rows["impulse"].any(axis=-1)]
@@ -415,7 +417,7 @@ def _kept(recording: Record, begin: float, end: float, samples: int) -> _Given:
 
 
 def _left_out(recording: Record, begin: float, end: float, blows: _Given) -> float:
-    """Return the share of the impulses on particles that lasting contacts gave, 0 to 1."""
+    """Return the share of the impulses on particles that is due to lasting contacts, 0 to 1."""
     knots, owner = recording.knots, recording.owner
     h = np.diff(knots["t"])
     within = (np.minimum(knots["t"][1:], end) - np.maximum(knots["t"][:-1], begin)).clip(min=0.0)
@@ -423,7 +425,7 @@ def _left_out(recording: Record, begin: float, end: float, blows: _Given) -> flo
     given = np.diff(knots["velocity"], axis=0)[left]
     given += recording.gravity * h[left, None] * recording.machine.up
     sizes = np.hypot(*given.T)
-    # Flights give and take rounding.
+    # Flights change momentum only by gravity, to rounding.
     fast = np.hypot(*knots["velocity"][left].T) + recording.gravity * h[left]
     borne = recording.mass[owner[left]] * np.where(sizes > 1e-9 * fast, sizes, 0.0)
     lasting = float((borne * within[left] / h[left]).sum())

@@ -1,8 +1,8 @@
-"""The laws that every run is judged by as it ends: those that cost little.
+"""The laws by which every run is judged at its end: those that cost little.
 
-They look at what is recorded, and at where the machine's surfaces are, and share nothing with the
-engines. The core finds what is broken (laws.c, barriers.c); the words are here. `Recording.laws` is
-what comes of it; `chutelab stress` has more laws, which take longer.
+They use the recording and the places of the machine's surfaces, and share nothing with the engines.
+The core finds broken laws (laws.c, barriers.c); the words are here. `Recording.laws` is the result;
+`chutelab stress` has more laws, which take longer.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ ENERGY, LOSSES, LEDGER = "energy rises only by drives", "no loss is negative", "
 SOLVED, STEP = "each step is solved", "speed times step below the radius"
 
 LAWS = (FINITE, THROUGH, INSIDE, ENERGY, LOSSES, LEDGER, SOLVED, STEP)
-"""Their names, in the order in which they are told, and in that of the core's enum Law."""
+"""Their names, in the order of reports and of the core's enum Law."""
 
 UNITS = {FINITE: "", THROUGH: "", INSIDE: "m", SOLVED: "radii", STEP: "m"}
-"""Units of what is found; of the others J."""
+"""Units of the amounts found; of the others J."""
 
 INTEGER = np.dtype("<i4")
 
@@ -35,31 +35,31 @@ _NUMBERS = np.dtype(
     {"names": ["t", "rest"], "formats": ["f8", ("f8", 10)],
      "offsets": [0, EVENT.itemsize - 80], "itemsize": EVENT.itemsize}
 )  # fmt: skip
-"""All numbers of an event that are not whole: its time, and the last ten."""
+"""All floats of an event: its time, and the last ten."""
 
 
 @dataclass(frozen=True)
 class Broken:
-    """A law that a run did not keep, where it did so first.
+    """A law that a run broke, at the first place.
 
     Attributes
     ----------
     law : str
         One of `LAWS`.
     particles : int
-        How many particles broke it; 0 if it is about all of them together.
+        How many particles broke it; 0 if it concerns all of them together.
     particle : int
-        The first of them, -1 if it is about all together.
+        The first of them; -1 if it concerns all together.
     t : float
-        When, s; of what is about the whole run its end.
+        Time, s; the end of the run if the law concerns the whole run.
     position : tuple of float
-        Where its centre was, m; NaN if it is about all together.
+        Place of its centre, m; NaN if it concerns all together.
     surface : str
-        Which surface it is about; "" if none.
+        The surface concerned; "" if none.
     amount, bound : float
-        What was found, and what it must not exceed, in `unit`.
+        The amount found and its upper bound, in `unit`.
     unit : str
-        m, J, radii, or "" of a count.
+        m, J, radii, or "" for a count.
     advice : str
         What to do.
     """
@@ -77,7 +77,7 @@ class Broken:
 
     @property
     def told(self) -> str:
-        """What was broken, by which particle, where, when, and by how much."""
+        """The law, the particle, place, time and amount in words."""
         more = f" and {self.particles - 1:,} more" if self.particles > 1 else ""
         which = f"particle {self.particle}{more}" if self.particles else "all together"
         where = f", {self.surface}" if self.surface else ""
@@ -92,17 +92,17 @@ class Broken:
 
 
 class Findings(NamedTuple):
-    """What the core finds of a run.
+    """The core's findings on a run.
 
     Attributes
     ----------
     breaches : ndarray, (B,)
         The laws that are broken, in the order of `LAWS`: rows of the core's `Breach`.
     hits : ndarray, (H,)
-        Where particles are deeper in surfaces than `allowed`, or pass them, by particle and time:
-        rows of the core's `Hit`.
+        Places where particles overlap surfaces by more than `allowed`, or pass them, by particle
+        and time: rows of the core's `Hit`.
     figures : object
-        Bounds, and what they follow from: the core's `Laws`, whose arrays are no more.
+        Bounds and the numbers behind them: the core's `Laws`, without its arrays.
     """
 
     breaches: NDArray[Any]
@@ -133,11 +133,11 @@ def judge(recording: Record) -> tuple[Broken, ...]:
 
 
 def _hinges(recording: Record, figures: Any) -> list[Broken]:
-    """Judge what hangs on hinges by its states, and what the scene says acts on it.
+    """Judge hinges by their states and the numbers of the scene.
 
     E is its energy, ΔE = worked + pushed - given - stopped - damped; damped = ∫ damper rate² dt;
-    stops hold; a motor works no more than its torque times its way. Pymunk, of the order of its
-    step, is judged by ΔE alone, roughly.
+    no stop is passed; a motor's work is at most its torque times the angle. Pymunk, with errors of
+    the order of its step, is judged only roughly, by ΔE.
     """
     told = list[Broken]()
     if not recording.machine.movers:
@@ -172,7 +172,7 @@ def _hinges(recording: Record, figures: Any) -> list[Broken]:
         rates = hinge.at(t[:-1, None] + h * share)[1]
         lost = hinge.damper * float((h * rates**2 @ np.array([5.0, 8.0, 5.0]) / 18.0).sum())
         way = hinge.motor[1] * float(np.abs(np.diff(angle)).sum())
-        # rad/s; by which it hops in a step, with what lies on it.
+        # rad/s; change in a step by the hop of a hinge with the particles on it.
         moments = hinge.motor[1] + hinge.spring * np.abs(angle - hinge.rest).max()
         moments += recording.gravity * (hypot(*hinge.moment) + 2.0 * hinge.gyration * load)
         moments += hinge.damper * np.abs(rate).max()
@@ -197,11 +197,12 @@ def _hinges(recording: Record, figures: Any) -> list[Broken]:
 
 
 CLOSES, ROUGHLY, EPS = 1e-9, 0.2, 1e-15
-"""Shares of a hinge's energies, the second in Pymunk, and J, up to which its ledger is closed."""
+"""Allowed residual of a hinge's ledger, as shares of its energies (the second in Pymunk), and in
+J."""
 
 HOPS = 0.05
-"""Share by which a damper's loss and a motor's work may be off what the states say of them: what is
-pressed hops from step to step, between its states."""
+"""Allowed deviation of a damper's loss and a motor's work from the values computed from the states:
+a pressed hinge hops between its states."""
 
 BEYOND = 1e-3
 """rad; by which a hinge may be beyond its stops."""
@@ -224,11 +225,11 @@ def examine(recording: Record) -> Findings:
 _NO_BREACHES, _NO_HITS = np.empty(0, core.dtype("Breach")), np.empty(0, core.dtype("Hit"))
 
 _FOUND, _TOLD = "findings", "laws"
-"""Under which a recording keeps what the core finds, and what is told of it."""
+"""Names under which a recording caches the core's findings and the broken laws."""
 
 
 def take(module: core.Module, recording: Record) -> None:
-    """Keep with a recording what the core found of it, if it has looked at the run in memory."""
+    """Keep the core's findings with a recording, if it has judged the run in memory."""
     figures: Any = module.structs["Laws"]
     if not figures.breaches:
         return
@@ -244,7 +245,7 @@ def take(module: core.Module, recording: Record) -> None:
 
 
 def _lay_out(module: core.Module, recording: Record) -> None:
-    """Hand a run over to the core."""
+    """Pass a run to the core."""
     machine, count = recording.machine, recording.count
     bodies = np.empty(count, core.dtype("Body"))
     bodies["radius"], bodies["mass"] = inner_radius(machine), machine.particle.mass
@@ -292,11 +293,11 @@ def _lay_out(module: core.Module, recording: Record) -> None:
 
 
 _ENGINES = ("exact", "contact", "pymunk")
-"""In the order of the core's enum Engine."""
+"""Engines in the order of the core's enum Engine."""
 
 
 def alike(recording: Record) -> bool:
-    """Tell whether Chipmunk finds and solves all contacts, in equal steps."""
+    """Whether Chipmunk finds and solves all contacts, in steps of equal length."""
     m = recording.machine
     return recording.engine == "pymunk" and (
         m.interact
@@ -325,9 +326,9 @@ def inner_radius(machine: Machine) -> Any:
 
 
 def barriers(machine: Machine) -> NDArray[Any]:
-    """Return all pieces of surfaces as rows of the core's `Barrier`, as far as it asks.
+    """Return all pieces of surfaces as rows of the core's `Barrier`.
 
-    Straight ones, bent ones, and the drive pulley last; (P,), of a family (N, P).
+    Straight ones, bent ones, and the drive pulley last; (P,), in a family (N, P).
     """
     ahead = () if machine.segments.length.ndim == 1 else (machine.count,)
     rims = [] if machine.pulley is None else [machine.pulley.rim]
@@ -347,7 +348,7 @@ def barriers(machine: Machine) -> NDArray[Any]:
 
 
 def _advice(recording: Record, law: str, figures: Any) -> str:
-    """Return what may help."""
+    """Return advice."""
     report, machine = "if it stays so, report it with the scene", recording.machine
     if recording.engine == "exact":
         return f"run it with --engine contact, and {report}"

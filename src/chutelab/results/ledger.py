@@ -1,11 +1,10 @@
-"""The energy ledger of a recording, at the end or any time: where every joule came from and went.
+"""The energy ledger of a recording, at the end or at any time.
 
 (K + U) at the end - (K + U) at the start
 = belt_work + drive_work - restitution_loss - friction_loss + residual,
-with the energy in springs in U, and what dampers take among the losses, where something hangs on a
-hinge.
-Every entry is accumulated from impulses and contact-point velocities, none is a remainder; so the
-residual is the numerical error, and is shown as such.
+with hinges, U includes the energy in springs, and the losses include those of dampers. Every entry
+is accumulated from impulses and contact-point velocities; none is a remainder. So the residual is
+the numerical error, and is shown as such.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ AIR = "still air"
 
 @dataclass(frozen=True, repr=False)
 class Ledger(Shown):
-    """Energies of all particles together, and of what hangs on hinges, J.
+    """Energies of all particles together, and of hinges, J.
 
     Attributes
     ----------
@@ -43,25 +42,25 @@ class Ledger(Shown):
     belt_work : float
         Tangential impulse times belt speed: what the drives pay.
     drive_work : float
-        Impulse times the velocity that the motion of a surface gives to where it acts: what moves
-        it; of what hangs on a hinge the work of its motor. In the tracks and in `by_stream` it is
-        part of the belt work, of a hinge all that it gives to particles.
+        Impulse times the velocity of the moving surface at the contact: the work of its drive; for
+        hinges the work of motors. In the tracks and in `by_stream` it is part of the belt work,
+        which there includes all work of hinges on particles.
     spring : tuple of float
-        Energies in springs at the start and at the end. Of what hangs on hinges
-        kinetic and potential energies are counted, too, the latter with y = 0 at the hinge.
+        Energies in springs at the start and at the end. Kinetic and potential energies of hinges
+        are counted in those of the particles, the latter with y = 0 at the hinge.
     damper_loss : float
-        What dampers take.
+        Energy that dampers take.
     push_work : float
-        Work of forces by hand, see `chutelab.start`. In the tracks and in `by_stream` that on
+        Work of forces by hand, see `chutelab.start`. In the tracks and in `by_stream` the work on
         particles is part of the belt work.
     restitution_loss : float
         Normal part of the losses in impacts.
     friction_loss : float
-        Slip heat, and with air what that takes.
+        Slip heat, and the loss to air.
     air_loss : float
-        What of it air takes.
+        The part of it that is lost to air.
     residual : float
-        What the balance leaves over: the numerical error.
+        Remainder of the balance: the numerical error.
     turned_over : float
         Kinetic energy at the start + the sizes of the three entries + the size of the change of
         potential energy.
@@ -69,9 +68,10 @@ class Ledger(Shown):
         The three entries of each surface, of ``"particles"``, and with air of ``"still air"``;
         where surfaces move also ``drive_work``.
     by_stream : dict of dict
-        ``kinetic``, ``potential``, the three entries, and ``from_others``, of each stream; empty if
-        there is one. The last is what the balance of a stream leaves over: the energy that it got
-        from particles of others, in contacts. Over all streams it is the residual.
+        ``kinetic``, ``potential``, the three entries, and ``from_others`` of each stream; empty if
+        there is only one. ``from_others`` is the remainder of a stream's balance: the energy that
+        it got from particles of other streams in contacts. Its sum over all streams is the
+        residual.
     """
 
     kinetic: tuple[float, float]
@@ -95,9 +95,9 @@ class Ledger(Shown):
         return abs(self.residual) / self.turned_over if self.turned_over > 0.0 else 0.0
 
     def sheet(self, *, details: bool = False) -> Sheet:
-        """Return the entries of each surface that has any, their sum, and what is left over.
+        """Return the entries of each surface that has any, their sum, and the residual.
 
-        With `details` the residual is told down to rounding.
+        With `details` the residual is shown down to rounding.
         """
         share = self.relative_residual
         left = (
@@ -184,7 +184,7 @@ def ledger(recording: Record) -> Ledger:
     closed["belt_work"] -= work
     pushed = by_surface[PARTICLES]["belt_work"]
     if len(springs := recording.springs):
-        # What springs gave is told as what they keep, and what their dampers took.
+        # Show the work of springs as the energy that they store and the loss of their dampers.
         before, after, damped, given = springs.sum(axis=0).tolist()
         pushed = pushed - given if abs(pushed - given) > ROUNDING * abs(springs).sum() else 0.0
         by_surface[PARTICLES] |= {"belt_work": pushed, "damper_loss": damped}
@@ -207,7 +207,7 @@ def ledger(recording: Record) -> Ledger:
 def _hung(
     recording: Record, by_surface: dict[str, dict[str, float]], closed: dict[str, Any]
 ) -> dict[str, Any]:
-    """Add to a ledger what hangs on hinges: its energies, its drive, and what it loses."""
+    """Add hinges to a ledger: energies, work of motors, and losses."""
     for mover in recording.machine.movers:
         if mover.hinge is None:
             continue
@@ -237,7 +237,7 @@ def _hung(
 
 
 def _closed(found: dict[str, Floats]) -> dict[str, Any]:
-    """Sum what `ledger_of_each` has of some particles."""
+    """Sum `ledger_of_each` over some particles."""
     kinetic, potential = (
         (float(found[f"{energy}.start"].sum()), float(found[f"{energy}.end"].sum()))
         for energy in ("kinetic", "potential")
@@ -256,13 +256,13 @@ def _closed(found: dict[str, Floats]) -> dict[str, Any]:
 def energy_at(recording: Record, times: ArrayLike) -> dict[str, Floats]:
     """Return the energy ledger of all released particles up to each time.
 
-    A particle that has ended keeps its last state. Between two knots the entries and the
-    residual go straight from the one to the other, and what the energy balance asks for besides
-    is booked on what goes on there: on the friction loss while a particle slips, where the
-    force and so the power of the belt is constant on a face; else on the belt work while it is
-    driven; else on the restitution loss, which changes between knots in lasting contacts of a
-    crowd only. In flight nothing is booked, and what the balance leaves over is the residual.
-    Where several have `totals` the sums are theirs at the steps; the same holds between two.
+    A particle that has ended keeps its last state. Between two knots the entries and the residual
+    are interpolated linearly. The rest of the energy balance is booked on the process that goes on
+    there: on the friction loss while a particle slips, since the force and so the power of the belt
+    is constant on a flat face; else on the belt work while it is driven; else on the restitution
+    loss, which changes between knots only in lasting contacts of a crowd. In flight nothing is
+    booked, and the rest is the residual. With `totals` the sums are theirs at the steps; the same
+    holds between two steps.
 
     Parameters
     ----------
@@ -273,11 +273,11 @@ def energy_at(recording: Record, times: ArrayLike) -> dict[str, Floats]:
     -------
     dict of ndarray, shape (T,)
         ``kinetic``, ``potential`` (y = 0 is the zero), the three `ENTRIES`, and ``residual``:
-        what the balance since each release leaves over. J.
+        remainder of the balance since each release. J.
     """
     times = np.atleast_1d(np.asarray(times, dtype=np.float64))
     found = _on_tracks(recording, times)
-    # A lone particle's tracks have all; a blow on what hangs on a hinge ends the step.
+    # A lone particle's tracks have everything; an impact on a hinge ends the step.
     if len(recording.totals) > 1 and recording.count > 1:
         within = (times >= recording.totals["t"][0]) & (times < recording.totals["t"][-1])
         found[:, within] = _as_totals(recording, times[within], found[:, within])
@@ -285,7 +285,7 @@ def energy_at(recording: Record, times: ArrayLike) -> dict[str, Floats]:
 
 
 def _on_tracks(recording: Record, times: Floats) -> Floats:
-    """Return what `energy_at` does as the tracks have it, (6, T), J."""
+    """Return `energy_at` from the tracks, (6, T), J."""
     firsts, lasts = recording.ends()
     at_release = np.zeros(recording.count)
     particles = np.flatnonzero(recording.released)
@@ -307,10 +307,10 @@ def _on_tracks(recording: Record, times: Floats) -> Floats:
 
 
 def _as_totals(recording: Record, times: Floats, found: Floats) -> Floats:
-    """Return what tracks have (6, T), J, with what they are off the totals of all steps.
+    """Return the sums of tracks (6, T), J, corrected to the totals of all steps.
 
-    That goes straight from just after one step to just before the next. What the balance then
-    asks for besides within a step is booked on what goes on there.
+    The correction is linear from just after one step to just before the next. The rest of the
+    balance within a step is booked on the process that goes on there.
     """
     t, particles, firsts = (
         recording.totals["t"],
@@ -324,7 +324,7 @@ def _as_totals(recording: Record, times: Floats, found: Floats) -> Floats:
     )
     sums = np.concatenate([np.zeros((2, 1)), at_release.cumsum(axis=1)], axis=1)
     before, after = (sums[:, np.searchsorted(begun, t, side=side)] for side in ("left", "right"))
-    # A step of no length, after which they are noted once more, has released what begins then.
+    # After a step of no length, which has released particles, totals are noted again.
     before[:, 1:] = np.where(t[1:] > t[:-1], before[:, 1:], after[:, 1:])
     told = np.stack(
         [recording.totals["kinetic"], recording.totals["potential"], *recording.totals["entries"].T]
@@ -335,7 +335,7 @@ def _as_totals(recording: Record, times: Floats, found: Floats) -> Floats:
     late = np.searchsorted(t, times, side="right") - 1
     step, own = np.unique(np.clip(late, 0, len(t) - 2), return_inverse=True)
     first = told[:, step] - _on_tracks(recording, t[step])
-    # What is released as a step begins is in its tracks, and not yet in its totals.
+    # A particle released at the beginning of a step is in the tracks, but not yet in the totals.
     first[:2] += (after - before)[:, step]
     last = told[:, step + 1] - _on_tracks(recording, np.nextafter(t[step + 1], -np.inf))
     share = ((times - t[step][own]) / (t[step + 1] - t[step])[own]).clip(0.0, 1.0)
@@ -355,7 +355,7 @@ def _as_totals(recording: Record, times: Floats, found: Floats) -> Floats:
 def _under_way(
     recording: Record, particle: Ints, left: Ints, share: Floats, at_release: Floats
 ) -> tuple[Floats, ...]:
-    """Return what `energy_at` does, of each cell, (c,)."""
+    """Return `energy_at` for each cell, (c,)."""
     a, b = recording.knots[left], recording.knots[left + 1]
     where, pace = hermite(recording.knots, left, share)
     omega = a["omega"] + share * (b["omega"] - a["omega"])
@@ -371,7 +371,7 @@ def _under_way(
     )
     belt, restitution, friction = entries_a + share * (entries_b - entries_a)
     residual = residual_a + share * (residual_b - residual_a)
-    # The straight lines of the totals leave a rest, which is booked on what goes on.
+    # Linear totals leave a rest, which is booked on the process that goes on.
     missing = gain - (belt - restitution - friction) - residual
     driven, struck, slips = entries_a != entries_b
     friction -= np.where(slips, missing, 0.0)

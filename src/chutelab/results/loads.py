@@ -1,8 +1,8 @@
-"""Loads: what surfaces bear in bins of time, from blows and lasting contacts.
+"""Loads on surfaces in bins of time, from impacts and lasting contacts.
 
-Engines sum impulses, each where and when it acts; forces are these over the width of a bin. They
-are on the surface: `normal` presses it, `along` drags it along (n_y, -n_x), n the normal towards
-the particle: forward on a belt that lies below what it carries.
+Engines add up impulses with their places and times; forces are these over the width of a bin. They
+act on the surface: `normal` presses it, `along` drags it along (n_y, -n_x), with n the normal
+towards the particle: forward on a belt that carries particles.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from chutelab.util.errors import InputError, did_you_mean
 from chutelab.util.tables import Sheet, Shown, number
 
 NONE = np.empty((0, 0), LOAD)
-"""Loads of a run that counted none."""
+"""Loads of a run without them."""
 
 MOST_BINS: int = constant("MOST_BINS")
 OVERFLOW = f"so long that the run has {MOST_BINS:,} bins or fewer"
 
 MANY = 1000
-"""Calls of `Bins.bear` that are summed up together."""
+"""Calls of `Bins.bear` that are added up together."""
 
 TOLERANCE = 1e-9
-"""Share of a bin that a width may be off a whole number of bins."""
+"""Share of a bin by which a width may differ from a whole number of bins."""
 
 
 def gather(module: Module, surfaces: int) -> NDArray[np.void]:
-    """Return what the core has counted, of so many surfaces, (bins, surfaces)."""
+    """Return the core's loads on so many surfaces, (bins, surfaces)."""
     told: Any = module.structs["Loads"]
     if not told.bins:
         return NONE
@@ -44,12 +44,12 @@ def gather(module: Module, surfaces: int) -> NDArray[np.void]:
         raise InputError(OVERFLOW, "run.loads", told.every)
     shape = told.used, told.owner_count, LOAD.itemsize // REAL.itemsize
     rows = module.array("bins", REAL, prod(shape), of="Loads").reshape(shape)
-    # Numbers are copied faster than records of them.
+    # Plain numbers are copied faster than records.
     return rows[:, :surfaces].copy().view(LOAD)[..., 0]
 
 
 def gather_lasting(module: Module) -> NDArray[np.void]:
-    """Return what lasting contacts gave in the core's contact engine, (C,)."""
+    """Return the impulses of lasting contacts from the core's contact engine, (C,)."""
     told: Any = module.structs["Loads"]
     if told.overflow:
         raise InputError("so long that all bins have room in memory", "run.stress", told.each)
@@ -58,9 +58,9 @@ def gather_lasting(module: Module) -> NDArray[np.void]:
 
 
 class Bins:
-    """Counts impulses on particles, for engines that are not in the core; as `core/loads.c` does.
+    """Adds up impulses on particles, like `core/loads.c`, for engines outside the core.
 
-    Of a machine that asks for no loads it counts nothing: look at `every` first.
+    It must not be used for a machine without loads: check `every` first.
     """
 
     def __init__(self, machine: Machine) -> None:
@@ -78,7 +78,7 @@ class Bins:
         Parameters
         ----------
         surface : int or (k,)
-            Which ones bear them.
+            The surfaces that they act on.
         begin, end : float or (k,)
             When.
         place, normal, push : (2,) or (2, k)
@@ -96,14 +96,14 @@ class Bins:
             self._count()
 
     def _count(self) -> None:
-        """Sum up what waits."""
+        """Add up the waiting calls."""
         x, y, nx, ny, px, py, turn, begin, end, surface = np.concatenate(self._waiting, axis=1)
         self._waiting.clear()
         first = np.floor(begin / self.every).astype(np.int64).clip(0)
         rows, own = max(len(self._sums), int(first.max(initial=0)) + 2), surface.astype(np.int64)
         if rows > MOST_BINS:
             raise InputError(OVERFLOW, "run.loads", self.every)
-        # What of it is in the next bin.
+        # The share that is in the next bin.
         span = np.where(end > begin, end - begin, inf)
         late = ((end - (first + 1) * self.every) / span).clip(0.0, 1.0)
         press, fx, fy = px * nx + py * ny, -px, -py
@@ -118,7 +118,7 @@ class Bins:
         self._sums = sums
 
     def counted(self) -> NDArray[np.void]:
-        """Return all that was counted, (bins, surfaces)."""
+        """Return all loads, (bins, surfaces)."""
         if self._waiting:
             self._count()
         used = np.flatnonzero(self._sums.any(axis=(1, 2)))
@@ -129,8 +129,8 @@ class Bins:
 class Part(NamedTuple):
     """A load in its unit: its mean over time, the largest size of a bin, the root mean square.
 
-    From the first bin in which anything is borne to the last; NaN without one. The end is the mean
-    in the last bin that the run filled.
+    It is taken from the first to the last bin with a load; NaN without one. The end is the mean in
+    the last bin that the run filled.
     """
 
     mean: float
@@ -141,7 +141,7 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Load(Shown):
-    """What a surface bears over time.
+    """The load on a surface over time.
 
     Attributes
     ----------
@@ -150,19 +150,20 @@ class Load(Shown):
     edges : ndarray, shape (T + 1,)
         Of the bins of time, s.
     normal, along : ndarray, shape (T,)
-        Mean force in each bin that presses it, and that drags it along (n_y, -n_x), N.
+        Mean force in each bin that presses it, and mean force along (n_y, -n_x), N.
     force : ndarray, shape (T, 2)
-        The whole of both, N.
+        The whole force, N.
     place : ndarray, shape (T, 2)
-        Where it is pressed, m: the mean of places by what presses there; NaN where nothing does.
+        Place of the normal load, m: mean of the contact points, weighted with their normal
+        impulses; NaN without one.
     pivot : (float, float)
-        What torques are about, m: the hinge or pivot, as written, of what moves; a plate's pivot,
-        the axis of the drive pulley, an arc's centre; of others the first end.
+        Reference point of torques, m: hinge or pivot, as written, of a moving surface; a plate's
+        pivot, the axis of the drive pulley, an arc's centre; for other surfaces the first end.
     torque : ndarray, shape (T,)
         Of the force about the pivot, counterclockwise, N m; about where it is in the middle of the
         bin, if it travels or shakes.
     filled : int
-        How many bins the run went through; later ones than T are without load.
+        How many bins the run went through; bins after T have no load.
     """
 
     name: str
@@ -197,7 +198,7 @@ class Load(Shown):
 
 
 def pivot_of(machine: Machine, surface: int) -> tuple[float, float]:
-    """Return what torques on a surface are about, see `Load`, m."""
+    """Return the reference point of torques on a surface, see `Load`, m."""
     name, scene, mover = machine.surfaces[surface], machine.scene, machine.mover(surface)
     if mover is not None:
         return mover.pivot
@@ -224,7 +225,7 @@ def need_loads(recording: Record) -> None:
 
 
 def loads(recording: Record, name: str, every: float | None = None) -> Load:
-    """Return what a surface bears over time, in bins of ``run.loads`` or a multiple of it.
+    """Return the load on a surface over time, in bins of ``run.loads`` or a multiple of it.
 
     Parameters
     ----------
@@ -233,12 +234,12 @@ def loads(recording: Record, name: str, every: float | None = None) -> Load:
     name : str
         Of the surface.
     every : float, optional
-        How long a bin is, s.
+        Width of the bins, s.
 
     Raises
     ------
     InputError
-        If the run counted no loads, if there is no such surface, or if the bins do not divide.
+        If the run has no loads, there is no such surface, or the bins do not divide.
     """
     need_loads(recording)
     machine, rows = recording.machine, recording.impulses
@@ -276,12 +277,12 @@ def loads(recording: Record, name: str, every: float | None = None) -> Load:
 
 @kept
 def load(recording: Record, name: str) -> Load:
-    """Return what a surface bears, in the bins that the run counted."""
+    """Return the load on a surface, in the bins of the run."""
     return loads(recording, name)
 
 
 def borne(recording: Record) -> dict[str, Load]:
-    """Return the loads of all surfaces that bear anything, by their names."""
+    """Return the loads of all surfaces that have any, by their names."""
     if not recording.impulses.size:
         return {}
     bear = np.flatnonzero(recording.impulses["force"].any(axis=(0, 2))).tolist()
@@ -289,7 +290,7 @@ def borne(recording: Record) -> dict[str, Load]:
 
 
 def told(recording: Record) -> dict[str, dict[str, dict[str, float]]]:
-    """Return what the JSON of a run has: by surface and part, mean, peak, rms and end."""
+    """Return the loads for the JSON of a run: by surface and part, mean, peak, rms and end."""
     parts = ("normal", "along", "torque")
     return {
         name: {key: one.part(key)._asdict() for key in parts}

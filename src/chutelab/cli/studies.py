@@ -110,7 +110,7 @@ def sweep(
 
     --vary KEY=FROM:TO:COUNT  A key of the scene and its values, such as plate.angle_deg=0:60:61 or
         incoming.speed=2,4. May be repeated: all combinations are simulated.
-    --uncertainty KEY=VALUE±SPREAD Instead of --vary: an uncertain key, such as
+    --uncertainty KEY=VALUE±SPREAD  Instead of --vary: an uncertain key, such as
         plate.restitution=0.5±0.05, where 0.05 is the standard deviation (with :uniform at the end
         the half-width). Says how uncertain that makes landing and belt work, for each kind of
         outcome, and which key matters most.
@@ -273,7 +273,7 @@ def solve(
 
     --vary KEY=FROM:TO  A key of the scene and the range to search, such as plate.angle_deg=0:80.
         May be repeated. [required]
-    --target QUANTITY=VALUE The value wanted: VALUE is a number, with or without unit, a key of the
+    --target QUANTITY=VALUE  The value wanted: VALUE is a number, with or without unit, a key of the
         scene or another quantity. May be repeated with as many --vary.
     --minimize QUANTITY  Make this as small as possible.
     --maximize QUANTITY  Make this as large as possible.

@@ -1,15 +1,16 @@
-"""Large crowds on disk: whole numbers of what a track may be off, less what is foretold.
+"""Large crowds on disk: differences from a prediction, rounded to whole units.
 
-A share ε of the radius r of the smallest particle is allowed. Velocities are told by their change
-from knot to knot less that of a flight, in units of 2.5 ε r / dt, or less if kinetic energies ask
-for it. Beside intervals longer than a step dt the units are finer, since a cubic bulges by a
-quarter of what they are off times the interval: 0.44 ε r, half a unit off along both axes at both
-ends. The mean of two velocities foretells the way between them, exactly on a parabola. The rest of
-a place is told in units of 0.28 times what that of a velocity is in a step, which is 0.5 ε r off at
-most, and after an interval much shorter than a step in finer ones: else the velocity *between* two
-knots would be far off. So a track is off by less than ε r at any time. Entries of the ledger have
-units of which all particles together are off by less than ε of the energy turned over. The tracks
-foretell the states of events, and these the impulses.
+Tracks may be off by a share ε of the radius r of the smallest particle. A velocity is stored as its
+change from knot to knot less that of a flight, in units of 2.5 ε r / dt, or smaller ones if kinetic
+energies require it. Next to intervals longer than a step dt the units are finer, since an error of
+the velocities bulges the cubic by a quarter of it times the interval: 0.44 ε r, if they are off by
+half a unit along both axes at both ends. The mean of two velocities predicts the displacement
+between them, exactly on a parabola. The rest of a place is stored in units of 0.28 times the unit
+of velocity times dt, with an error of at most 0.5 ε r. After an interval much shorter than a step
+these units are finer, or the velocity *between* two knots would be far off. So a track is off by
+less than ε r at any time. Entries of the ledger have units with which the error of all particles
+together is less than ε of the energy turned over. The states of events are predicted from the
+tracks, and the impulses from these states.
 
 Times, the ends of tracks, and all sums such as the ledger's are kept to the last bit.
 """
@@ -38,19 +39,20 @@ COLUMNS = {
     "sizes": np.dtype("u1"),
     "bits": np.dtype("u1"),
 }
-"""Arrays that `pack` makes of knots, angles and events, and their types."""
+"""Arrays that `pack` makes from knots, angles and events, and their types."""
 
 LONG = 0.25
-"""Steps that an interval has at least after which a place is told by itself."""
+"""After an interval of at least so many steps a place is stored by itself, not as a change."""
 
 FINEST = 20
-"""Units of places are halved so often at most: those of intervals of a millionth of a step."""
+"""Most halvings of the units of places, for intervals of a millionth of a step."""
 
 MOST = 2.0**52
-"""Bound on all whole numbers that are rounded."""
+"""Bound on all rounded whole numbers."""
 
 LEAST = 2.0**-30
-"""Share of a unit by which an entry changes at least that changes by less than one."""
+"""A change of an entry by less than a unit is stored as a change if it is at least this share of
+one."""
 
 WHOLE = ("particle", "other", "kind", "surface")
 """Fields of an event that are whole numbers."""
@@ -61,13 +63,14 @@ STATE: tuple[tuple[str, Any], ...] = (
     ("velocity_after", (..., 0)), ("velocity_after", (..., 1)), ("omega_after", ...),
     ("normal_impulse", ...), ("tangential_impulse", ...),
 )  # fmt: skip
-"""Its other fields but the time, and which part of them."""
+"""The other fields of an event except the time, with the component of each."""
 
 ROWS = (0, 0, 1, 1, 2, 1, 1, 2, 4, 4)
-"""Which of the units these have."""
+"""Index of the unit of each."""
 
 Give = Callable[[slice, Floats], Floats]
-"""Takes some rows of `STATE` and what is foretold of them, (c, E), and returns what is the case."""
+"""Function of some rows of `STATE` and their predictions, (c, E), that returns the actual
+values."""
 
 
 def rounded(values: Floats) -> Ints:
@@ -78,7 +81,7 @@ def rounded(values: Floats) -> Ints:
 
 
 def fold(numbers: Ints) -> NDArray[np.uint8]:
-    """Return what numbers (c, n) change by along n as bytes (k, c, n), the lowest first."""
+    """Return the differences of numbers (c, n) along n as bytes (k, c, n), the lowest first."""
     change = np.diff(numbers, prepend=0)
     told = ((change << 1) ^ (change >> 63)).view(np.uint8).reshape(*numbers.shape, 8)
     few = max((n + 1 for n in range(8) if told[..., n].any()), default=1)
@@ -86,7 +89,7 @@ def fold(numbers: Ints) -> NDArray[np.uint8]:
 
 
 def unfold(told: NDArray[np.uint8]) -> Ints:
-    """Return what `fold` was given."""
+    """Return the input of `fold`."""
     found = np.zeros((*told.shape[1:], 8), dtype=np.uint8)
     found[..., : len(told)] = np.moveaxis(told, 0, -1)
     bits = found.view(np.int64)[..., 0]
@@ -94,7 +97,7 @@ def unfold(told: NDArray[np.uint8]) -> Ints:
 
 
 def write(arrays: Iterable[Ints]) -> dict[str, NDArray[np.uint8]]:
-    """Return whole numbers as how many binary digits they have, and all digits but the first."""
+    """Return whole numbers as their numbers of binary digits, and all digits but the first."""
     sizes, bits = [], []
     for numbers in map(np.ravel, arrays):
         size = np.abs(numbers)
@@ -108,7 +111,7 @@ def write(arrays: Iterable[Ints]) -> dict[str, NDArray[np.uint8]]:
 
 
 class Reader:
-    """Gives back what `write` was given, in the same order."""
+    """Returns the numbers given to `write`, in the same order."""
 
     def __init__(self, sizes: NDArray[np.uint8], bits: NDArray[np.uint8]) -> None:
         self.sizes, self.bits = sizes, bits
@@ -136,7 +139,7 @@ class Reader:
 
 
 class Intervals:
-    """What comes before each knot: from times of knots (K,), offsets of tracks, and units.
+    """The interval before each knot, from times of knots (K,), offsets of tracks, and units.
 
     Attributes
     ----------
@@ -145,11 +148,11 @@ class Intervals:
     h : ndarray, shape (K,)
         Time since the knot before, s; 0 at the first one.
     long : ndarray, shape (K,)
-        Whether that is `LONG`, or the knot the first one: there a chain begins.
+        Whether this is `LONG`, or the knot is the first one: there a chain begins.
     chain : ndarray, shape (K,)
-        The knot where the chain begins that this one is in.
+        The knot where the chain of this knot begins.
     share : ndarray, shape (K,)
-        Along a chain places are told in so small a share of their unit.
+        Share of their unit in which places are stored along a chain.
     finer : ndarray, shape (K,)
         How often units of velocities are halved.
     """
@@ -159,43 +162,43 @@ class Intervals:
         self.first, self.last = offsets[:-1][released], offsets[1:][released] - 1
         self.h = np.diff(t, prepend=t[:1])
         self.h[self.first] = 0.0
-        # A step may be rounded up; of what is from 2^(k - 1) to 2^k, k is the exponent.
+        # A step may be rounded up; k is the exponent for lengths from 2^(k - 1) to 2^k steps.
         steps = self.h / (1.001 * units[6])
         self.long = steps >= LONG
         self.long[self.first] = True
         begin = np.flatnonzero(self.long)
         self.chain = begin[np.cumsum(self.long) - 1]
         exponent = np.where(steps > 0.0, np.frexp(steps)[1], -FINEST)
-        # Chains are short, but not always: what adds up along one has to stay small.
+        # Chains are usually short; errors that add up along a long one have to stay small.
         self.share = np.ldexp(0.25, exponent.clip(-FINEST, 0))
         self.finer = np.maximum(exponent, np.append(exponent[1:], 0)).clip(0)
         self.some, self.speeds = self.finer > 0, units[[1, 1, 2], None]
         self.fall = rounded(np.outer(np.append(units[7:9], 0.0), self.h) / self.speeds)
 
     def rates(self, motion: Ints, more: Ints) -> Floats:
-        """Return velocities and spins, (3, K), of what is told of them, and more of some."""
+        """Return velocities and spins, (3, K), from stored numbers, some corrected."""
         rates = self.speeds * np.cumsum(motion + self.fall, axis=1)
         rates[:, self.some] += np.ldexp(self.speeds * more, -self.finer[self.some])
         return np.asarray(rates)
 
     def tell_rates(self, rates: Floats) -> tuple[Ints, Ints]:
-        """Return what `rates` takes."""
+        """Return the numbers that `rates` decodes."""
         motion = rounded(rates / self.speeds)
         more = np.ldexp((rates / self.speeds - motion)[:, self.some], self.finer[self.some])
         return np.diff(motion, prepend=0, axis=1) - self.fall, rounded(more)
 
     def passed(self, rate: Floats) -> Floats:
-        """Return how far the means of a rate lead from the first of all knots, (K,)."""
+        """Return the integral of a rate from the first knot on, by means of knots, (K,)."""
         return np.cumsum(0.5 * self.h * (np.append(rate[:1], rate[:-1]) + rate))
 
     def places(self, told: Ints, rate: Floats, unit: float) -> Floats:
-        """Return places, or angles, (K,): what is told of where chains begin, and along them."""
+        """Return places, or angles, (K,), from numbers at starts of chains and along them."""
         begin = unit * np.cumsum(np.where(self.long, told, 0))
         along = np.cumsum(np.where(self.long, 0.0, unit * self.share * told))
         return np.asarray(begin + (along - along[self.chain]) + self.passed(rate))
 
     def tell_places(self, places: Floats, rate: Floats, unit: float) -> Ints:
-        """Return what `places` takes."""
+        """Return the numbers that `places` decodes."""
         left = places - self.passed(rate)
         along = np.where(self.long, 0.0, np.diff(left, prepend=0.0))
         told = rounded(along / (unit * self.share))
@@ -203,9 +206,10 @@ class Intervals:
         return told
 
     def entries(self, told: Ints, unit: float, ends: Floats) -> Floats:
-        """Return entries, (3, K), of which `tell_entries` told; those of `ends` are (2, n, 3).
+        """Return entries, (3, K), from those of `tell_entries` and the `ends`, (2, n, 3).
 
-        What does not change beside an end is that of the end: else a last interval seems to change.
+        An entry that does not change next to an end equals that of the end; otherwise the last
+        interval would seem to change it.
         """
         change = told - (told > 0) + LEAST * (told == 1)
         entries, changes = unit * np.cumsum(change, axis=1), np.cumsum(told != 0, axis=1)
@@ -216,7 +220,7 @@ class Intervals:
         return np.asarray(entries)
 
     def end_at(self, places: Floats, ends: Floats) -> None:
-        """Move the chains in which tracks begin and end so that they do so at places (2, n)."""
+        """Move the first and last chain of each track such that its ends are (2, n)."""
         moved = np.zeros(len(places))
         moved[self.chain[self.last]] = ends[1] - places[self.last]
         moved[self.first] = ends[0] - places[self.first]
@@ -224,9 +228,9 @@ class Intervals:
 
 
 def tell_entries(entries: Floats, unit: float) -> Ints:
-    """Return how many units entries (3, K) change by, and one more: one is for what is less.
+    """Return changes of entries (3, K) in units; above 0 plus 1, as 1 is less than a unit.
 
-    What goes on between two knots is read from which of them change at all.
+    Which entries change at all shows what goes on between two knots.
     """
     change = np.diff(rounded(entries / unit), prepend=0)
     changes = np.diff(entries, prepend=0.0) != 0.0
@@ -235,10 +239,10 @@ def tell_entries(entries: Floats, unit: float) -> Ints:
 
 @dataclass
 class Tracks:
-    """What `COLUMNS` hold but for the states of events.
+    """The content of `COLUMNS` except the states of events.
 
-    `still` (E,) are events that change nothing; `keys` (K,) of knots and `when` (E,) of events are
-    in the order of particles and times.
+    `still` (E,) marks events that change nothing; `keys` (K,) of knots and `when` (E,) of events
+    are in the order of particles and times.
     """
 
     knots: NDArray[Any]
@@ -253,9 +257,9 @@ class Tracks:
     def of(
         cls, packed: dict[str, NDArray[Any]], offsets: Ints, read: Callable[..., Ints]
     ) -> Tracks:
-        """Return them; `ValueError` or `IndexError` if the columns do not fit together.
+        """Return the content; `ValueError` or `IndexError` if the columns do not fit together.
 
-        `read` returns the next whole numbers, of the shape that it is given.
+        `read` returns the next whole numbers, in a given shape.
         """
         units, ends = packed["units"], packed["ends"]
         times = unfold(packed["times"])[0].view(np.float64)
@@ -285,13 +289,14 @@ class Tracks:
         return cls(knots, angle, events, still > 0, keys, when, units[ROWS, None])
 
     def states(self, particle: Particle, give: Give) -> Floats:
-        """Return all rows of `STATE`, as they are foretold from the tracks and from those before.
+        """Return all rows of `STATE`, predicted from the tracks and from earlier rows.
 
         `particle` has radii, masses and inertias.
         """
         knots, events = self.knots, self.events
         begin, end = (np.searchsorted(self.keys, self.when, side) for side in ("left", "right"))
-        # Where the track has knots at that time, they are the states; else it leads past them.
+        # If the track has knots at that time, they are the states; otherwise use the track between
+        # knots.
         there, left = end > begin, np.clip(begin - 1, 0, len(knots) - 2)
         a, b = knots[np.where(there, begin, left)], knots[np.where(there, end - 1, left)]
         t, h = knots["t"][left], knots["t"][left + 1] - knots["t"][left]
@@ -302,7 +307,7 @@ class Tracks:
         changes, same = ~self.still, before[2:]
         after = np.where(there, np.stack([*b["velocity"].T, b["omega"]]), same)
         after = np.where(changes, give(np.s_[5:8], np.where(changes, after, same)), same)
-        # An impulse is the change of momentum; what of it is along the surface changes the spin.
+        # An impulse is the change of momentum; its tangential part changes the spin.
         body = particle.of(events["particle"])
         along = body.inertia / body.radius * (after[2] - before[4])
         square = body.mass**2 * ((after[:2] - before[2:4]) ** 2).sum(axis=0) - along**2
@@ -311,16 +316,16 @@ class Tracks:
 
 
 def units_of(record: Record, tolerance: float) -> Floats:
-    """Return the units of places, speeds, spins, energies, impulses and angles; and other numbers.
+    """Return units of places, speeds, spins, energies, impulses and angles, and three numbers.
 
-    These are dt, the acceleration of gravity, and 1 if there are angles.
+    The numbers are dt, the acceleration of gravity, and 1 if there are angles.
     """
     machine, dt = record.machine, float(record.machine.dt)
     radius, mass = float(record.radius.min()), float(record.mass.min())
     turned = ledger(record).turned_over
     fastest = sqrt((record.knots["velocity"] ** 2).sum(axis=1).max())
     speed = 2.5 * tolerance * radius / dt
-    # Half of it changes kinetic energies by no more than the tolerance of what is turned over.
+    # Half a unit changes kinetic energies by at most the tolerance times the energy turned over.
     if turned * fastest > 0.0:
         speed = min(speed, 2.0 * tolerance * turned / (record.mass.sum() * fastest))
     energy = tolerance * turned / sqrt(record.count)
@@ -331,12 +336,12 @@ def units_of(record: Record, tolerance: float) -> Floats:
 
 
 def pack(record: Record, tolerance: float) -> dict[str, NDArray[Any]]:
-    """Return `COLUMNS` of a crowd of an engine that takes steps, within a tolerance, in radii.
+    """Return `COLUMNS` of a crowd of a stepped engine, within a tolerance, in radii.
 
     Raises
     ------
     OverflowError
-        If whole numbers of what may be off do not reach as far as the particles.
+        If the places of particles are too large for whole numbers of units.
     """
     knots, events, units = record.knots, record.events, units_of(record, tolerance)
     intervals = Intervals(knots["t"], record.offsets, units)
@@ -370,7 +375,7 @@ def pack(record: Record, tolerance: float) -> dict[str, NDArray[Any]]:
 def unpack(
     packed: dict[str, NDArray[Any]], offsets: Ints, particle: Particle
 ) -> dict[str, NDArray[Any]]:
-    """Return the knots, angles and events that `pack` was given, within its tolerance."""
+    """Return the knots, angles and events given to `pack`, within its tolerance."""
     reader = Reader(packed["sizes"], packed["bits"])
     tracks = Tracks.of(packed, offsets, reader.read)
 

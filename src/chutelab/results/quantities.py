@@ -1,13 +1,13 @@
-"""What is read off a recording: the registry's quantities, and particle 0 beside the theory.
+"""Quantities of a recording, by the registry, and particle 0 beside the theory.
 
 `measure` gives a quantity of a run by its name, such as ``landing.x.mean``, `each` that of each
 particle, such as ``landing.x``, and `measured` that of each variant of a family. A quantity's row
-is in `chutelab.scene.quantities`. `compare` holds the paper's symbols of particle 0 against the
+is in `chutelab.scene.quantities`. `compare` compares the paper's symbols of particle 0 with the
 theory.
 
-One error serves everywhere: |simulated - theory| / max(|theory|, scale), where the scale is what
-the quantity is measured by in its scene: d1 for lengths, v2 for speeds, t2 + t3 for times, 1 rad
-for angles, ½ m v2² for energies.
+The error is defined as |simulated - theory| / max(|theory|, scale), with the scale of the quantity
+in its scene: d1 for lengths, v2 for speeds, t2 + t3 for times, 1 rad for angles, ½ m v2² for
+energies.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def first(recording: Record, event: str, surface: str | None = None) -> NDArray[
     """Return the first "separation", "impact" or "landing" of each particle, (N,), dtype `EVENT`.
 
     From the incoming belt, on the plate and on the outgoing belt, unless another surface is given.
-    NaN throughout where it did not happen. Read-only.
+    All NaN if it did not happen. Read-only.
     """
     surface, events = surface or NEEDED[event], never(recording.count)
     if surface in recording.surfaces:
@@ -75,7 +75,7 @@ def paid(recording: Record, surface: str, entry: str) -> Floats:
 def symbols(recording: Record) -> dict[str, Floats]:
     """Return `THEORY` of each particle, (N,), SI units and radians; NaN without one."""
     left, hit, down = (first(recording, event).copy() for event in NEEDED)
-    # In the paper's frame an impact is counted from the separation, a landing from the impact.
+    # In the paper's frame an impact is relative to the separation, a landing to the impact.
     hit[np.isnan(left["t"])] = never(1)
     down[np.isnan(hit["t"])] = never(1)
     own = recording.particle
@@ -84,9 +84,9 @@ def symbols(recording: Record) -> dict[str, Floats]:
 
 
 def until_no_slip(recording: Record, landed: Floats) -> dict[str, Floats]:
-    """Return the theory's belt work and slip heat of each particle that landed then (s), J.
+    """Return belt work and slip heat of each particle that landed at a time (s), J.
 
-    Known of a lone particle that slips no more, and met nothing but the belt since it landed.
+    Known for a lone particle that no longer slips and met only the belt since its landing.
     """
     found = np.full((2, len(landed)), nan)
     if recording.count == recording.variants and "outgoing" in recording.surfaces:
@@ -108,11 +108,11 @@ def from_events(
     radius: Numbers,
     mass: Numbers,
 ) -> dict[str, Floats]:
-    """Return what separation, impact and landing tell of `THEORY`, in the paper's frame.
+    """Return the part of `THEORY` that follows from separation, impact and landing.
 
-    x2, y2 are counted from the separation point, y down; x3 and v3x back from the plate. The events
-    are (N,), of one scene or a family of N, and NaN, as `never` has it, where one did not happen;
-    radius (m) and mass (kg) are the particles'.
+    In the paper's frame: x2, y2 from the separation point, y down; x3 and v3x back from the plate.
+    The events are (N,), of one scene or a family of N, and NaN, as in `never`, if one did not
+    happen; radius (m) and mass (kg) are the particles'.
     """
     value, scene = scenes.value, scenes.scene
     plate = scene.plate
@@ -156,7 +156,7 @@ class Comparison(Shown):
     Attributes
     ----------
     simulated, theory : dict of float
-        All of `THEORY`; NaN where the particle, or the theory, does not get so far.
+        All of `THEORY`; NaN if the particle, or the theory, does not get so far.
     errors : dict of float
         Relative errors of the quantities that both have.
     reason : str
@@ -174,10 +174,10 @@ class Comparison(Shown):
         return max(self.errors.values(), default=None)
 
     def sheet(self, *, details: bool = False) -> Sheet:
-        """Return every quantity that one of the two has, and the largest error.
+        """Return every quantity that either has, and the largest error.
 
         Beside the paper's power is the true one, the belt work at the same rate of particles.
-        Errors are in percent; with `details` they are as they are, down to rounding.
+        Errors are in percent; with `details` they are shown down to rounding.
         """
 
         def written(error: float) -> str:
@@ -213,19 +213,19 @@ class Comparison(Shown):
 
 
 def predicted(prediction: Transfer, row: Quantity) -> float:
-    """Return what the theory predicts of a quantity, in its unit; NaN where it has none."""
+    """Return the theory's value of a quantity, in its unit; NaN if it has none."""
     value = float(getattr(prediction, row.field)) if row.theory else nan
     return degrees(value) if row.unit == "degrees" else value
 
 
 @kept
 def prediction(recording: Record) -> Transfer:
-    """Return what the theory predicts for the scene of a recording, see `chutelab.theory`."""
+    """Return the theory's prediction for the scene of a recording, see `chutelab.theory`."""
     return predict(recording.scene)
 
 
 def need_recording(given: object) -> None:
-    """Raise a `TypeError` if something is no recording, such as the name of a scene."""
+    """Raise a `TypeError` if something is not a recording, such as the name of a scene."""
     if not isinstance(given, Record):
         raise TypeError(f"{given!r} is no recording; give what chutelab.simulate(...) returns")
 
@@ -282,13 +282,13 @@ def scales(scenes: Scene | Family, prediction: Transfer) -> dict[str, Any]:
 
 
 OTHER = (Kind.COLLISION, Kind.STICK, Kind.SETTLE)
-"""Events that the theory's equations do not know of, before the landing or on another surface."""
+"""Events outside the theory's equations, before the landing or on another surface."""
 
 
 def worst(recording: Record) -> Floats:
     """Return the largest relative error of particle 0 of each of V variants, (V,); NaN without one.
 
-    `predict` takes one scene at a time, so of a family the events tell how far the equations hold.
+    `predict` takes one scene at a time, so for a family the events show how far the equations hold.
     """
     scene, count = recording.scene, recording.variants
     if recording.family is None:
@@ -316,8 +316,8 @@ def worst(recording: Record) -> Floats:
 def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
     """Return separation, impact and landing of particle 0 of each of V variants.
 
-    The equations hold where these are its first three events, in this order. They did not happen
-    from the first event on that is another one, nor in variants whose `holds`, (V,), is false.
+    The equations hold if these are its first three events, in this order. From the first other
+    event on they count as not happened, as in variants whose `holds`, (V,), is false.
     """
     events, each = recording.events, recording.count // len(holds)
     kinds = [int(kind) for kind in (Kind.SEPARATION, Kind.IMPACT, Kind.LANDING, *OTHER)]
@@ -334,7 +334,7 @@ def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
         at, one = place == n, never(len(holds))
         put(one, own["particle"][at], own.take(at.nonzero()[0]))
         found.append(one)
-    # An impact that throws a carried particle off the belt is no separation of the theory.
+    # An impact that throws a carried particle off the belt is not the theory's separation.
     holds = holds & ~(found[0]["t"] >= found[1]["t"])
     for one, (event, surface) in zip(found, NEEDED.items(), strict=True):
         holds = holds & (one["kind"] == Kind[event.upper()])
@@ -378,7 +378,7 @@ def each(recording: Record, name: str) -> Floats:
             )
             return _at_end(recording, found[entry])
         case ["flight", "t"]:
-            # From the incoming belt to what is met next.
+            # From the incoming belt to the next surface.
             left = column(first(recording, "separation"), "t")
             met = (column(first(recording, event), "t") for event in ("impact", "landing"))
             return np.asarray(np.fmin(*met) - left)
@@ -403,18 +403,18 @@ def each(recording: Record, name: str) -> Floats:
 
 
 def _at_end(recording: Record, values: Any) -> Floats:
-    """Return what the released particles have, (n,), as that of all, (N,)."""
+    """Return values of the released particles, (n,), as values of all, (N,)."""
     found = np.full(recording.count, nan)
     found[recording.released] = values
     return found
 
 
 PASSED = ("count", "back", "rate", "mass_rate", "whole_rate", "depth")
-"""What a sensor tells of a run, as in `results.sensors.Reading`."""
+"""Quantities of a sensor, by their names in `results.sensors.Reading`."""
 
 
 def measured(recording: Record, name: str) -> Floats:
-    """Return a quantity that the scene has of each of V variants, (V,); NaN without one."""
+    """Return a quantity of the scene for each of V variants, (V,); NaN without one."""
     many = recording.variants
     shape = many, recording.count // many
     parts, own = name.split("."), np.ones(recording.count, dtype=bool)
@@ -429,7 +429,7 @@ def measured(recording: Record, name: str) -> Floats:
 
     match parts:
         case ["contacts"]:
-            # Of a family they are counted together.
+            # In a family they are counted together.
             return np.full(many, nan if recording.family else float(recording.contacts))
         case ["ended", reason] if reason in REASONS:
             return count(recording.ended_by(reason))
@@ -473,7 +473,7 @@ def measured(recording: Record, name: str) -> Floats:
         case [*quantity, statistic] if statistic in _STATISTICS:
             values = each(recording, ".".join(quantity))
             if shape[1] == 1:
-                # Of one particle all statistics are its value, but the spread.
+                # With one particle all statistics but the spread are its value.
                 return values - values if statistic == "spread" else values
             table, known = values.reshape(shape), (own & np.isfinite(values)).reshape(shape)
             found, whole = np.full(many, nan), known.all(axis=1)
@@ -488,10 +488,10 @@ def measure(recording: Record, name: str) -> float:
     """Return a quantity of a recording, in its unit; NaN if it did not happen.
 
     Names are those of `chutelab.scene.quantities`, such as ``x2``, ``landing.x.mean`` or
-    ``ledger.by_surface.plate.restitution_loss``. One that each particle has goes by its bare name
-    where there is one particle; of several, ``particles[0].landing.x`` is the first one's.
-    ``spread`` is the standard deviation, ``q02`` what 2 % of the particles are below. After
-    ``by_stream.NAME.`` it is that of the particles of one stream.
+    ``ledger.by_surface.plate.restitution_loss``. With one particle a quantity of particles has its
+    bare name; with several, ``particles[0].landing.x`` belongs to the first one. ``spread`` is the
+    standard deviation, ``q02`` the value below which 2 % of the particles lie. With the prefix
+    ``by_stream.NAME.`` it is that of one stream.
 
     Raises
     ------

@@ -41,7 +41,7 @@ PARTICLES = "particles"
 
 
 QUANTILES = (0.02, 0.5, 0.98)
-"""Shares of a stream on the near side of its one edge, its middle and its other edge."""
+"""Quantiles of a stream at one edge, in the middle and at the other edge."""
 
 
 class Kind(IntEnum):
@@ -59,7 +59,7 @@ class Kind(IntEnum):
 
 
 def kind_of(kind: Kind | str) -> Kind:
-    """Return a kind of event by its name, in small letters or capitals; `InputError` if none."""
+    """Return a kind of event by its name, in any case; `InputError` if there is none."""
     if isinstance(kind, str):
         names = [one.lower() for one in Kind.__members__]
         if kind.lower() not in names:
@@ -77,7 +77,7 @@ EVENT = np.dtype([
 ])  # fmt: skip
 """One event, in SI units.
 
-- ``t``: when, s.
+- ``t``: time, s.
 - ``particle``, ``other``: its number, and that of the particle it meets, or -1.
 - ``kind``: a `Kind`.
 - ``surface``: index into `Recording.surfaces`, or -1.
@@ -101,11 +101,12 @@ KNOT = np.dtype([
 
 
 TOTAL = np.dtype([("t", "f8"), ("kinetic", "f8"), ("potential", "f8"), ("entries", "f8", 3)])
-"""What all released particles of a crowd have together as a step begins, in SI units.
+"""Sums over all released particles of a crowd at the beginning of a step, in SI units.
 
 - ``t``: when, s.
-- ``kinetic``, ``potential``: rotation included; y = 0 is the zero, J. Of those that have ended at
-  their ends, of what lasts in contact halfway through its impulses, as the tracks are.
+- ``kinetic``, ``potential``: rotation included; y = 0 is the zero, J. Particles that have ended
+  count with their last state; those in lasting contact halfway through their impulses, as in the
+  tracks.
 - ``entries``: of the energy ledger, J, see `ENTRIES`.
 """
 
@@ -113,13 +114,13 @@ TOTAL = np.dtype([("t", "f8"), ("kinetic", "f8"), ("potential", "f8"), ("entries
 LOAD = np.dtype([
     ("normal", "f8"), ("along", "f8"), ("force", "f8", 2), ("moment", "f8"), ("at", "f8", 2)
 ])  # fmt: skip
-"""What a surface bears in a bin of time: impulses on it, in SI units.
+"""The load on a surface in a bin of time: impulses, in SI units.
 
-- ``normal``: what presses it, N s.
-- ``along``: what drags it along (n_y, -n_x), n the normal towards the particle, N s.
-- ``force``: the whole of both, N s.
-- ``moment``: of all that about the origin, N m s.
-- ``at``: places where it is pressed, each times what presses there, N m s.
+- ``normal``: the impulse that presses it, N s.
+- ``along``: the impulse along (n_y, -n_x), n the normal towards the particle, N s.
+- ``force``: the whole impulse, N s.
+- ``moment``: its moment about the origin, N m s.
+- ``at``: sum of contact points times their normal impulses, N m s.
 """
 
 
@@ -127,35 +128,35 @@ LASTING = np.dtype([
     ("particle", "i4"), ("other", "i4"), ("from", "f8"), ("to", "f8"), ("impulse", "f8", 2),
     ("stress", "f8", (2, 2)),
 ])  # fmt: skip
-"""What a lasting contact gave a particle between two times, in SI units.
+"""Impulse of a lasting contact on a particle between two times, in SI units.
 
-So are impulses of blows at one instant that were solved together: their events have the change of
-momentum of all of them, which is not of the size of the event's own impulse.
+Impulses of impacts at one instant that were solved together are recorded here, too: their events
+have the change of momentum of all of them, not only that of the event's own impulse.
 
 
-- ``other``: the other particle, which got the opposite; or -1 less the index of a surface.
+- ``other``: the other particle, which got the opposite impulse; or -1 less the index of a surface.
 - ``impulse``: J, N s.
 - ``stress``: sums of J_a b_b, N m s; b to the particle's centre from the other's, or from the
-  place where it touches the surface.
+  contact point on the surface.
 """
 
 
 def balance(entries: NDArray[Any]) -> Floats:
-    """Return the energy (J) that entries (..., 3) bring: belt work less both losses."""
+    """Return the energy (J) from entries (..., 3): belt work less both losses."""
     return np.asarray(entries[..., 0] - entries[..., 1] - entries[..., 2])
 
 
 CELLS = 2**18
-"""Times × particles in one block: some 30 arrays of 2 MB each, near enough to the cache."""
+"""Times × particles in one block: some 30 arrays of 2 MB each, about the size of the cache."""
 
 BRIEF = 1e-10
-"""Share of a coordinate: from a way that is less, no velocity is taken."""
+"""Share of a coordinate: a smaller displacement gives no velocity."""
 
 Cells = tuple[Ints, Ints, Ints, Floats]
-"""Times at which particles are on their way, arrays (c,): index of the time, and of the particle;
-index of the last knot that is not later (``left``; ``left + 1`` closes the interval, so at the end
-of a track it is the last knot but one); and the share of the interval that has passed, 0 to 1, 1
-where a track ends with an impact."""
+"""Particles under way at times, arrays (c,): index of the time, and of the particle; index of the
+last knot that is not later (``left``; ``left + 1`` closes the interval, so at the end of a track it
+is the last knot but one); and the share of the interval that has passed, 0 to 1 (1 if a track ends
+with an impact)."""
 
 
 def hermite(knots: NDArray[Any], left: Ints, share: Floats) -> tuple[Floats, Floats]:
@@ -167,11 +168,11 @@ def hermite(knots: NDArray[Any], left: Ints, share: Floats) -> tuple[Floats, Flo
         position, velocity = knots["position"][:, axis], knots["velocity"][:, axis]
         pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
         dx = pb - pa
-        # Written around the left knot, so that a long flight loses no digits.
+        # Expanded about the left knot, so that a long flight loses no digits.
         where = pa + s * (
             h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
         )
-        # A way that is lost in the digits of the place tells no velocity.
+        # A displacement that is lost in the digits of the place gives no velocity.
         told = h * (np.abs(va) + np.abs(vb)) > BRIEF * np.abs(pa)
         slope = np.divide(dx, h, out=0.5 * (va + vb), where=told)
         pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
@@ -180,10 +181,10 @@ def hermite(knots: NDArray[Any], left: Ints, share: Floats) -> tuple[Floats, Flo
 
 
 def turned(knots: NDArray[Any], angle: Floats, left: Ints, share: Floats) -> Floats:
-    """Return angles (rad) between two knots each, (c,), of those at all knots, (K,).
+    """Return angles (rad) between two knots each, (c,), from angles at all knots, (K,).
 
-    The spin is linear there; where its integral is not the difference of the angles, it is
-    corrected evenly.
+    The spin is linear there; a difference between its integral and the angles is distributed
+    evenly.
     """
     omega, h = knots["omega"], knots["t"][left + 1] - knots["t"][left]
     gained = h * share * (omega[left] + 0.5 * share * (omega[left + 1] - omega[left]))
@@ -192,7 +193,7 @@ def turned(knots: NDArray[Any], angle: Floats, left: Ints, share: Floats) -> Flo
 
 
 class Motion(tuple[Floats, Floats]):
-    """Positions (m) and velocities (m/s) at some times, (T, N, 2), a pair; and how particles turn.
+    """A pair: positions (m) and velocities (m/s) at times, (T, N, 2); with angles and spins.
 
     NaN before a particle's release and after its end; at an impact the state after it.
     """
@@ -208,7 +209,7 @@ class Motion(tuple[Floats, Floats]):
 
     @property
     def position(self) -> Floats:
-        """Where the centres are, (T, N, 2), m."""
+        """Positions of the centres, (T, N, 2), m."""
         return self[0]
 
     @property
@@ -226,10 +227,10 @@ class Motion(tuple[Floats, Floats]):
 
     @property
     def angle(self) -> Floats:
-        """How far particles are turned counterclockwise, from as they are written, (T, N), rad.
+        """Counterclockwise angles of particles from their shape as written, (T, N), rad.
 
-        The integral of `omega` since the release; where the recording says more, see
-        `Recording.angle`, that, corrected evenly from knot to knot.
+        The integral of `omega` since the release; with `Recording.angle`, corrected to these angles
+        evenly from knot to knot.
         """
         some, found = self._record, np.full(self[0].shape[:2], np.nan)
         passed, begun = some.angle, np.zeros(some.count)
@@ -246,13 +247,13 @@ class Motion(tuple[Floats, Floats]):
 class Record(Shown):
     """A finished run: read-only arrays, the same type from every engine.
 
-    The base of `Recording`, which is what `simulate` returns. Engines write it and the readers of
-    this room read it, so it imports none of them.
+    The base of `Recording`, which `simulate` returns. Engines write it and the modules of this room
+    read it, so it imports none of them.
 
     Attributes
     ----------
     machine : Machine
-        What was run; it knows the scene.
+        The machine that was run; it has the scene.
     engine : str
         ``"exact"``, ``"contact"`` or ``"pymunk"``.
     knots : ndarray, shape (K,), dtype `KNOT`
@@ -263,58 +264,58 @@ class Record(Shown):
     ended : ndarray, shape (N,)
         Indices into `REASONS`.
     events : ndarray, shape (E,), dtype `EVENT`
-        Sorted by time; at one time by particle, and of one particle as they came.
+        Sorted by time; at one time by particle, then in the order of recording.
     by_surface : ndarray, shape (len(surfaces), 3)
-        Ledger entries (J) of each surface, summed over particles. Of a family of machines (see
-        `chutelab.engines.exact`), and of none else, those of each particle, (N, len(surfaces), 3).
+        Ledger entries (J) of each surface, summed over particles. Only in a family of machines (see
+        `chutelab.engines.exact`) those of each particle, (N, len(surfaces), 3).
     steps : int
-        Steps taken; of the exact engine the most events that a particle took.
+        Steps taken; for the exact engine the largest number of events of a particle.
     contacts : int
         Impacts and collisions resolved.
     seconds : float
         Wall time from the validated scene to the recording; NaN in one that was loaded, or
         that an engine made without `simulate`.
     angle : ndarray, shape (K,), or (0,)
-        How far a particle is turned counterclockwise, from as it is written, at each knot, rad,
-        where some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not
-        tell. Empty where all are round: there it is the integral of ω.
+        Counterclockwise angle of the particle from its shape as written, at each knot, rad, if some
+        are boxes or polygons: Chipmunk also turns them to remove overlaps, which ω does not show.
+        Empty if all are round: then the angle is the integral of ω.
     instead : str
-        Where the engine that runs first broke a law of every run, and this one ran instead: which,
-        and how; else empty.
+        If the first engine broke a law of every run and this one ran instead: which engine, and
+        which law; else empty.
     gained : float
-        Energy (J) that the contact engine's solves made beyond what moving surfaces and the parting
+        Energy (J) made by the contact engine's solver beyond what moving surfaces and the removal
         of overlaps give, summed over all steps: rounding of the energy turned over, or the solver
-        is wrong (docs/physics.md, "The law of a solve"). 0 of other engines.
+        is wrong (docs/physics.md, "The law of a solve"). 0 for other engines.
     air_loss : float
-        What air takes of all particles, J; in the tracks it is part of the friction loss.
+        Energy of all particles lost to air, J; in the tracks it is part of the friction loss.
     totals : ndarray, shape (S,) or (0,), dtype `TOTAL`
         Energies of all particles together at each step of the contact engine in a crowd: its tracks
-        leave out what is less than a hop, and sums of squares of their velocities are not as near.
+        leave out changes smaller than a hop, so energies summed from them are less accurate.
     unsolved : ndarray, shape (S,) or (0,)
-        How well each of these steps was solved: the most overlap, in radii, that its solve leaves
-        beyond what it asks for. Solves end when that is small, or after so many sweeps.
+        How well each of these steps was solved: the largest overlap, in radii, left beyond what was
+        asked for. A solve ends when this is small, or after a number of sweeps.
     drives : ndarray, shape (len(surfaces),) or (0,)
-        What of the belt work (J) in `by_surface`, in the knots and in `totals` is the work of what
-        moves the surface, see docs/physics.md, "Moving surfaces". Empty where none does.
+        The part of the belt work (J) in `by_surface`, in the knots and in `totals` that is the work
+        of a surface's drive, see docs/physics.md, "Moving surfaces". Empty if none moves.
     impulses : ndarray, shape (B, len(surfaces) - 1) or (0, 0), dtype `LOAD`
-        What each surface bears in bins of ``run.loads`` seconds from 0 s on, up to the last one in
-        which anything is borne; empty where that is not asked for.
+        The loads on each surface in bins of ``run.loads`` seconds from 0 s on, up to the last bin
+        with a load; empty without ``run.loads``.
     lasting : ndarray, shape (C,) or (0,), dtype `LASTING`
-        What lasting contacts gave in bins of ``run.stress`` seconds, or as long as what they held
-        slept; blows are events. Of the contact engine, where that is asked for.
+        Impulses of lasting contacts in bins of ``run.stress`` seconds, or over the time of sleep;
+        impacts are events. Only from the contact engine, with ``run.stress``.
     swings : ndarray, shape (K,) or (0,), dtype `SWING`
-        States of what hangs on hinges, surface by surface, each one's in the order of time.
+        States of hinges, surface by surface, in the order of time.
     hinge_work : ndarray, shape (len(surfaces), 4) or (0, 4)
-        J; of what hangs on hinges the work of its motor, losses at its stops and in its damper, and
-        the work of pushes by hand. Empty where nothing does.
+        For hinges, J: work of the motor, losses at the stops and in the damper, and work of pushes
+        by hand. Empty without hinges.
     stopped : ndarray, shape (K,) or (0,)
-        J; of each of `swings` what the stops of its hinge have taken until then. Of the contact
-        engine.
+        For each of `swings`, J: the loss at the stops of its hinge until then. Only from the
+        contact engine.
     springs : ndarray, shape (S, 4)
-        J; of each ``[[spring]]`` what it kept when it was tied, what it keeps at the end, what its
-        damper took, and what it gave to particles, which is part of their belt work in the knots.
+        For each ``[[spring]]``, J: its energy when it was tied and at the end, the loss in its
+        damper, and its work on particles, which is part of their belt work in the knots.
     triggered : ndarray, shape (len(machine.triggers),)
-        When what waits for a touch came, went, or began to move, s; inf of what still waits.
+        Times at which triggers acted, s; inf for those that did not.
     """
 
     machine: Machine
@@ -356,17 +357,17 @@ class Record(Shown):
 
     @property
     def scene(self) -> Scene:
-        """The scene that was run; of a family one of its scenes."""
+        """The scene that was run; for a family one of its scenes."""
         return self.machine.scene
 
     @property
     def family(self) -> Family | None:
-        """All scenes that were run at once, if these are several."""
+        """All scenes that were run at once, if there are several."""
         return self.machine.family
 
     @property
     def variants(self) -> int:
-        """Number of scenes V; of a family each has as many of the particles, in turn."""
+        """Number of scenes V; in a family each has the same number of particles, in turn."""
         return 1 if self.family is None else self.count // self.family.each
 
     @property
@@ -401,12 +402,12 @@ class Record(Shown):
 
     @cached_property
     def found(self) -> dict[Any, Any]:
-        """What readers have found so far, see `kept`."""
+        """Cached results of readers, see `kept`."""
         return {}
 
     @cached_property
     def t(self) -> Floats:
-        """Times of all knots, s, in order and each once: what happens, happens between two."""
+        """Times of all knots, s, in order and each once."""
         return np.unique(self.knots["t"])
 
     @property
@@ -424,7 +425,7 @@ class Record(Shown):
         return np.asarray(self.ended == REASONS.index(reason))
 
     def sheet(self, *, details: bool = False) -> Sheet:
-        """Return what it holds, in a few lines; with `details` also how it was computed."""
+        """Return a short description; with `details` also how it was computed."""
         first, last = self.ends()
         happened = sorted(Counter(self.events["kind"].tolist()).items())
         ended = sorted(Counter(self.ended.tolist()).items())
@@ -442,7 +443,7 @@ class Record(Shown):
 
     @property
     def owner(self) -> Ints:
-        """Whose each knot is, (K,)."""
+        """The particle of each knot, (K,)."""
         return np.repeat(np.arange(self.count), np.diff(self.offsets))
 
     def track(self, particle: int) -> NDArray[Any]:
@@ -452,7 +453,7 @@ class Record(Shown):
     def ends(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the first and last knots of all released particles, each of shape (n,)."""
         first, end = self.offsets[:-1][self.released], self.offsets[1:][self.released]
-        # An index would copy rows field by field, which takes fifty times as long.
+        # Indexing would copy rows field by field, which takes fifty times as long.
         return self.knots.take(first), self.knots.take(end - 1)
 
     def surface_index(self, name: str) -> int:
@@ -480,7 +481,7 @@ class Record(Shown):
             raise InputError(did_you_mean(surface, self.surfaces, there), "surface", surface)
         keep = np.ones(len(self.events), dtype=bool)
         if kinds:
-            # Several times as fast as `np.isin` where events are few, as those of one particle.
+            # Several times as fast as `np.isin` for few events, as those of one particle.
             keep &= np.logical_or.reduce([self.events["kind"] == kind for kind in kinds])
         if surface is not None:
             keep &= self.events["surface"] == self.surface_index(surface)
@@ -489,14 +490,14 @@ class Record(Shown):
     def first(self, events: NDArray[Any]) -> NDArray[Any]:
         """Reduce events to the first one of each particle, in the order of the particles."""
         index, particle = np.full(self.count, -1), events["particle"].astype(np.int64)
-        # Of several the last one stays.
+        # Of several assignments the last one stays.
         index[particle[::-1]] = np.arange(len(particle))[::-1]
         return events.take(index[index >= 0])
 
     def pose(self, name: str, times: ArrayLike) -> Floats:
-        """Return where a surface is that moves: x, y of its pivot, m, and its angle, rad, (T, 3).
+        """Return the pose of a moving surface: x, y of its pivot, m, and its angle, rad, (T, 3).
 
-        The pivot is that of the scene file; of what has none its first point, or the centre of an
+        The pivot is that of the scene file; without one it is the first point, or the centre of an
         arc.
 
         Parameters
@@ -518,7 +519,7 @@ class Record(Shown):
         return movers[name].pose(np.atleast_1d(times))
 
     def blocks(self, times: Floats) -> Iterator[Cells]:
-        """Find the knots before and after every particle's place at times (T,), s, in any order.
+        """Find for each particle the knots before and after times (T,), s, in any order.
 
         Block by block in the order of the times; see `Cells`.
         """
@@ -543,7 +544,7 @@ class Record(Shown):
     def at(self, times: ArrayLike) -> Motion:
         """Return positions (m) and velocities (m/s), (T, N, 2), at times (T,), s, in any order.
 
-        What it returns is a pair of arrays, and has `Motion.angle` and `Motion.omega`, (T, N).
+        The result is a pair of arrays, and has `Motion.angle` and `Motion.omega`, (T, N).
         """
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         position, velocity = np.full((2, len(times), self.count, 2), np.nan)
@@ -557,7 +558,7 @@ class Record(Shown):
     ) -> tuple[Floats, Floats]:
         """Return kinetic (rotation included) and potential energy (J) of knots of any shape.
 
-        `particle` says whose each is; it is not needed where all particles are alike.
+        `particle` has the particle of each; it is not needed if all particles are alike.
         """
         body = self.particle if particle is None else self.particle.of(particle)
         vx, vy = knots["velocity"][..., 0], knots["velocity"][..., 1]
@@ -572,7 +573,7 @@ Result = TypeVar("Result")
 def kept(
     reader: Callable[Concatenate[Record, Args], Result],
 ) -> Callable[Concatenate[Record, Args], Result]:
-    """Keep with a record what a reader found there, for each set of further arguments.
+    """Cache a reader's result in its record, for each set of further arguments.
 
     Arrays become read-only.
     """

@@ -1,8 +1,8 @@
 """Collecting knots, events and ledger entries while an engine runs.
 
 Engines hand over whole arrays in the order of time *per particle*; sorting happens once, at the
-end. They count positions from a place near the machine: far from the world's origin coordinates
-have few digits left.
+end. Their positions are relative to a point near the machine, since coordinates far from the
+world's origin have few digits left.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from chutelab.util.arrays import Bools, Floats, Ints, put, sorted_by
 class StalledError(RuntimeError):
     """A loop reached its bound: a particle makes no progress.
 
-    It says which one, when (s) and where its centre is (m); the reason is a half-sentence: what
-    happened too often, and what to do about it. The recording is of what went before: tracks that
-    were under way end at their last knots, with reason ``"time"``.
+    It has the particle, the time (s) and the place of its centre (m); the reason says what happened
+    too often, and what to do about it. The recording has everything before: tracks that were under
+    way end at their last knots, with reason ``"time"``.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class StalledError(RuntimeError):
 
 
 class EnoughError(Exception):
-    """Raised by what watches a run's progress: the run is to end here.
+    """Raised by the observer of a run's progress to end the run.
 
     An engine closes the tracks that are under way with reason ``"stopped"``, which is also that of
     particles not yet released, and returns the recording.
@@ -58,11 +58,11 @@ class EnoughError(Exception):
 
 
 WAYS = frozenset(("position", "velocity", "velocity_before", "velocity_after", "force", "at"))
-"""Vectors among what is told of knots, events and loads."""
+"""Names of vectors in knots, events and loads."""
 
 
 def upright(machine: Machine) -> Machine:
-    """Return a machine that stays where it is, turned so that gravity is straight down."""
+    """Return a machine at its place, turned so that gravity points straight down."""
     frame = machine.frame.T
     segments, arcs, releases = machine.segments, machine.arcs, machine.releases
     return replace(
@@ -82,10 +82,10 @@ REMOTE = 8.0
 
 
 def origin(machine: Machine) -> tuple[float, float]:
-    """Return the world point that the engine calculates from, m: near the machine.
+    """Return the world point near the machine that the engine uses as origin, m.
 
-    It is (0, 0) unless the machine is many times its own size away from there; and so round a
-    number that taking it off a coordinate loses no digit.
+    It is (0, 0) unless the machine is many times its own size away from there. It is a round
+    number, so that subtracting it loses no digit.
     """
     if machine.pulley is not None or not (corners := machine.corners).size:
         return 0.0, 0.0
@@ -127,18 +127,18 @@ def moved(machine: Machine, x: float, y: float) -> Machine:
 
 
 NOTHING = np.zeros(0)
-"""Numbers that a run does not have."""
+"""Empty arrays for numbers that a run does not have."""
 
 
 class Recorder:
     """Grows by chunks; `finish` turns it into a frozen `Record` of the machine's run.
 
-    With `apart`, `by_surface` is kept for each particle, (N, S, 3). What is written down is counted
-    from `origin`, m, see the function: engines run `near`, the machine moved there;
-    `turned` so that gravity is straight down, if they know it so alone.
+    With `apart`, `by_surface` is kept for each particle, (N, S, 3). Recorded positions are relative
+    to `origin`, m, see the function: engines run `near`, the machine moved there, and `turned` so
+    that gravity points straight down if they need that.
     """
 
-    # What few runs have; never changed in place.
+    # Data that few runs have; never changed in place.
     swings, springs = np.empty(0, SWING), np.zeros((0, 4))
     stopped = unsolved = triggered = NOTHING
     totals, lasting = np.empty(0, TOTAL), np.empty(0, LASTING)
@@ -152,7 +152,7 @@ class Recorder:
             self.near = moved(machine, -self.origin[0], -self.origin[1])
             self.near = upright(self.near) if turned else self.near
             self._angular = any(outline is not None for outline in machine.outlines)
-        count, owners = machine.count, len(machine.surfaces) + 1  # and the particles
+        count, owners = machine.count, len(machine.surfaces) + 1  # and one for the particles
         self.entries = np.zeros((count, 3))
         self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))
         self.ended = np.zeros(count, dtype=np.int8)
@@ -161,7 +161,7 @@ class Recorder:
         self.gained = self.air_loss = 0.0
         if machine.triggers:
             self.triggered = np.full(len(machine.triggers), np.inf)
-        # Of engines that count loads here, if these are asked for.
+        # For engines that count loads in Python, if loads are asked for.
         self.bins = Bins(machine) if machine.loads else None
         self._knots: list[NDArray[Any]] = []
         self._owners: list[Ints] = []
@@ -191,7 +191,7 @@ class Recorder:
     def add(self, particle: Ints, knots: NDArray[Any], angle: ArrayLike = 0.0) -> None:
         """Add finished knots (k,) of particles (k,), each particle's in the order of time.
 
-        Angles (rad) are kept where some are boxes or polygons.
+        Angles (rad) are kept if some are boxes or polygons.
         """
         self._knots.append(knots)
         self._owners.append(particle)
@@ -199,11 +199,11 @@ class Recorder:
             self._angles.append(np.broadcast_to(np.asarray(angle, dtype=float), len(knots)).copy())
 
     def take_events(self, packed: NDArray[np.uint8]) -> None:
-        """Add events as the core hands them over: the bytes of rows of `EVENT`, kept no longer."""
+        """Add events from the core, as bytes of rows of `EVENT`; the bytes are copied."""
         self._events.append(np.frombuffer(packed, EVENT))
 
     def take_totals(self, rows: NDArray[Any]) -> None:
-        """Take what the core has of all steps, dtype ``Total``."""
+        """Take the core's totals of all steps, dtype ``Total``."""
         self.totals = np.frombuffer(bytearray(rows.getfield(f"V{TOTAL.itemsize}").tobytes()), TOTAL)
         self.unsolved = rows["unsolved"].copy()
 
@@ -250,7 +250,7 @@ class Recorder:
         self._events.append(chunk)
 
     def whole(self, record: Record, stalled: StalledError | None) -> Record:
-        """Return a run's record; if a particle stalled, raise that with the record instead."""
+        """Return a run's record; if a particle got stuck, raise the error with the record."""
         if stalled is None:
             return record
         frame = self.machine.frame if self._turned else np.eye(2)
@@ -296,7 +296,7 @@ class Recorder:
             order = t.argsort(kind="stable") if in_turn else np.lexsort((particle, t))
             events = events.take(order)
         elif one:
-            # It may lie in the core.
+            # It may lie in the core's memory, so copy it.
             events = np.frombuffer(bytearray(events.tobytes()), EVENT)
         if self._turned:
             knots, frame = knots.copy(), self.machine.frame
@@ -321,7 +321,7 @@ class Recorder:
                 (x, y), force = self.origin, self.impulses["force"]
                 self.impulses["moment"] += x * force[..., 1] - y * force[..., 0]
                 self.impulses["at"] += self.impulses["normal"][..., None] * self.origin
-            # Rounding may put something just behind the end of the last track.
+            # By rounding something may lie just after the end of the last track.
             bins = max(1, ceil(knots["t"].max() / self.machine.loads - 1e-9))
             self.impulses, beyond = self.impulses[:bins], self.impulses[bins:]
             for name in LOAD.names or () if len(beyond) else ():
@@ -357,9 +357,9 @@ _ITEM = np.dtype(f"V{KNOT.itemsize}")
 
 
 def read_knots(rows: NDArray[Any]) -> tuple[Ints, NDArray[Any], Floats]:
-    """Return what `Recorder.add` takes of knots as the core writes them, dtype ``Knot``: copies.
+    """Return copies of the core's knots, dtype ``Knot``, as arguments of `Recorder.add`.
 
-    Such a row begins with one of `KNOT`.
+    A row of ``Knot`` begins with one of `KNOT`.
     """
     own = np.frombuffer(rows.getfield(_ITEM).tobytes(), KNOT)
     return rows["disk"].astype(np.int64), own, rows["angle"].copy()
@@ -368,9 +368,9 @@ def read_knots(rows: NDArray[Any]) -> tuple[Ints, NDArray[Any], Floats]:
 def _joined(
     chunks: list[NDArray[Any]], dtype: np.dtype[Any], place: Ints | None = None
 ) -> NDArray[Any]:
-    """Join arrays and forget them, each item at its place, if there are any, else in their order.
+    """Join arrays and forget them; items go to the given places, if any, else in order.
 
-    As bytes, which is several times as fast.
+    They are copied as bytes, which is several times as fast.
     """
     if len(chunks) == 1 and place is None:
         return chunks.pop()
@@ -387,15 +387,15 @@ def _joined(
 
 
 ROUGH = 1e-4
-"""Share of the radius by which a track may be off between two knots."""
+"""Largest error of a track between two knots, as a share of the radius."""
 
 
 class Tracks:
-    """Knots of particles that are stepped, only as many as the curve through them needs.
+    """Knots of stepped particles, only as many as the curve through them needs.
 
     Between knots a track is a cubic, which a constant acceleration makes exact: a new knot is due
-    when the one of the first step since the last knot does not lead to where the particle is. With
-    `turning` that goes for the angle too, which is what ω, linear between knots, adds up to.
+    when the cubic of the first step since the last knot no longer leads to the particle's place.
+    With `turning` this holds for the angle too, the integral of ω, which is linear between knots.
     """
 
     def __init__(
@@ -435,7 +435,7 @@ class Tracks:
             self.pull[:, new] = (v[:, new] - self.v[:, new]) / tau[new]
         gain = tau * self.pull
         off = np.abs(x - self.x - tau * (self.v + 0.5 * gain))
-        # A cubic is off by 4/27 τ of what one of its end velocities is.
+        # An error of an end velocity shifts a cubic by up to 4/27 τ times it.
         off += 4.0 / 27.0 * tau * np.abs(v - self.v - gain)
         apart = off[0] + off[1]
         if self.turning:

@@ -1,8 +1,8 @@
 """Sensors: lines across a stream that count what passes, when, where, which way and how fast.
 
 A passage is where the track of a centre crosses the line between a sensor's ends, found on the
-curves between knots to rounding. Its way is 1 for what comes from the left of the line, seen from
-its first end, and -1 for the other way: through a sensor drawn upward, 1 is to the right.
+curves between knots to rounding. Its direction (`way`) is 1 from the left of the line, seen from
+its first end, and -1 from the right: through a sensor drawn upward, 1 is to the right.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ PASSAGE = np.dtype(
     [("t", "f8"), ("particle", "i4"), ("way", "i1"), ("along", "f8"), ("position", "f8", 2),
      ("velocity", "f8", 2)]
 )  # fmt: skip
-"""Time (s), particle, way, distance from the first end (m), position (m), velocity (m/s)."""
+"""Time (s), particle, direction, distance from the first end (m), position (m), velocity (m/s)."""
 
 HALVINGS = 60
-"""Bisections of an interval: they exhaust a double's digits."""
+"""Bisections of an interval, enough for all digits of a double."""
 
 Place = Sequence[float]
 
@@ -43,8 +43,8 @@ def need_sensors(scene: Scene) -> None:
 def passages(recording: Record, begin: Place, end: Place) -> NDArray[np.void]:
     """Return the passages of all particles through the line between two places (m), by time.
 
-    Their dtype is `PASSAGE`. Whether a track that only just touches the line passes, to and fro, is
-    a matter of the last digit.
+    Their dtype is `PASSAGE`. Whether a track that only just touches the line counts as two passages
+    depends on the last digit.
     """
     knots = recording.knots
     x, y = knots["position"].T
@@ -56,9 +56,9 @@ def passages(recording: Record, begin: Place, end: Place) -> NDArray[np.void]:
     last = np.zeros(len(knots), dtype=bool)
     last[recording.offsets[1:][recording.released] - 1] = True
     h = np.diff(knots["t"], append=0.0)
-    # Also between two knots at one time: a blow on the line may move a centre by its rounding.
+    # Also between two knots at one time: an impact on the line may move a centre by rounding.
     left = np.flatnonzero(~last)
-    # The control points of a cubic are on both sides where it crosses.
+    # If a cubic crosses, its control points are on both sides.
     third = h[left] / 3.0
     points = [off[left], off[left] + third * rate[left], off[left + 1] - third * rate[left + 1],
               off[left + 1]]  # fmt: skip
@@ -70,7 +70,7 @@ def passages(recording: Record, begin: Place, end: Place) -> NDArray[np.void]:
     def height(s: Floats, i: Ints | slice = slice(None)) -> Floats:
         return np.asarray(p[i] + s * (v[i] + s * (b[i] + s * c[i])))
 
-    # Its slope v + 2 b s + 3 c s² is zero at the cuts; between them it rises or falls throughout.
+    # Its slope v + 2 b s + 3 c s² is zero at the cuts; between them it is monotone.
     with np.errstate(invalid="ignore", divide="ignore"):
         far = -b - np.where(b < 0.0, -1.0, 1.0) * np.sqrt(b * b - 3.0 * c * v)
         turns = np.stack([far / (3.0 * c), v / far])
@@ -98,7 +98,7 @@ def passages(recording: Record, begin: Place, end: Place) -> NDArray[np.void]:
 
 @dataclass(frozen=True)
 class Reading:
-    """What a sensor tells of a run.
+    """The reading of a sensor in a run.
 
     Attributes
     ----------
@@ -107,21 +107,21 @@ class Reading:
     count, back : int
         Passages with way 1, and with way -1.
     mass : float
-        Of those less of these, kg.
+        Mass of the former less that of the latter, kg.
     rate, mass_rate : float
         Particles (1/s) and mass (kg/s) per time between the first and the last passage of way 1;
-        NaN of fewer than two.
+        NaN for fewer than two.
     whole_rate : float
-        t/h of all the width of the material; NaN unless ``stream.width`` is given.
+        t/h of the material's whole width; NaN unless ``stream.width`` is given.
     speed : dict of float
         ``mean``, ``q02``, ``q50`` and ``q98`` of the speeds of way 1, m/s.
     depth : float
-        How far apart along the line the outer 2 % of either side pass, with a particle's diameter:
-        the depth of the stream, m.
+        Distance along the line between the 2 % and 98 % quantiles of passages, plus a particle's
+        diameter: the depth of the stream, m.
     kinds : dict of int
         Passages of way 1 by kind of particle, where there are several.
     segregation : float
-        Correlation of radius and place along the line, -1 to 1; NaN where all are of one size.
+        Correlation of radius and place along the line, -1 to 1; NaN if all have one size.
     """
 
     name: str
@@ -145,13 +145,13 @@ def sensed(recording: Record, name: str) -> NDArray[np.void]:
 
 
 def reading(recording: Record, name: str) -> Reading:
-    """Return what a sensor of the scene tells."""
+    """Return the reading of a sensor of the scene."""
     found = sensed(recording, name)
     on = found[found["way"] > 0]
     mass, radius = recording.mass, recording.radius
     span = float(on["t"][-1] - on["t"][0]) if len(on) > 1 else 0.0
     brought = mass[on["particle"]]
-    # The first one opens the span; what passes in it is the others.
+    # The first passage opens the time span; the others pass within it.
     rate, flow = ((len(on) - 1) / span, float(brought[1:].sum()) / span) if span else (nan, nan)
     speeds = np.hypot(*on["velocity"].T)
     told = {"mean": nan} | {f"q{round(100 * share):02}": nan for share in QUANTILES}
@@ -184,7 +184,7 @@ def reading(recording: Record, name: str) -> Reading:
 
 @kept
 def first_passages(recording: Record, name: str) -> dict[str, Floats]:
-    """Return t, x, y, vx, vy, speed of each particle's first passage of way 1, (N,); else NaN."""
+    """Return t, x, y, vx, vy, speed of each particle's first passage of way 1, (N,); or NaN."""
     found = sensed(recording, name)
     found = found[found["way"] > 0]
     particles, rows = np.unique(found["particle"], return_index=True)
@@ -200,7 +200,7 @@ def first_passages(recording: Record, name: str) -> dict[str, Floats]:
 
 
 def readings(recording: Record) -> dict[str, Reading]:
-    """Return what all sensors of the scene tell, by their names; none of a family."""
+    """Return the readings of all sensors of the scene, by name; none for a family."""
     if recording.family is not None:
         return {}
     return {one.name: reading(recording, one.name) for one in recording.scene.sensor}
@@ -209,7 +209,7 @@ def readings(recording: Record) -> dict[str, Reading]:
 def residence(recording: Record, begin: str, end: str) -> Floats:
     """Return the time from the first passage of a sensor to the next one of another, (N,), s.
 
-    NaN of particles that do not pass both in this order.
+    NaN for particles that do not pass both in this order.
     """
     found = np.full(recording.count, nan)
     later, enters = sensed(recording, end), first_passages(recording, begin)["t"]

@@ -1,7 +1,7 @@
 """Recordings on disk: one npz file, and CSV for spreadsheets.
 
-The file round-trips to the last bit, that of a large crowd within a tolerance, see `packing`. How
-long the run took is not in it: the same run makes the same bytes.
+The file keeps all bits, that of a large crowd within a tolerance, see `packing`. It does not have
+the time that the run took, so the same run makes the same bytes.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ from chutelab.util.tables import frame as data_frame
 from chutelab.util.tables import plain
 
 FORMAT, PACKED = 1, 2
-"""Versions of the file, the second of large crowds; a reader refuses what it does not know."""
+"""Versions of the file, the second for large crowds; other versions are refused."""
 
 TOLERANCE = 1e-6
-"""Share of the radius by which tracks of a large crowd may be off in a file."""
+"""Largest error of tracks of a large crowd in a file, as a share of the radius."""
 
 MANY = 10_000
-"""Knots from which on a crowd is large."""
+"""A crowd with at least so many knots is large."""
 
 ARRAYS = {
     "knots": KNOT,
@@ -77,41 +77,42 @@ TYPES = ARRAYS | packing.COLUMNS
 """Types of all arrays that a file may have."""
 
 UNPACKED = ("knots", "angle", "events")
-"""Arrays that stand in a packed file as `packing.COLUMNS`."""
+"""Arrays that are stored in a packed file as `packing.COLUMNS`."""
 
 MAYBE = (
     "angle", "totals", "unsolved", "drives", "impulses", "lasting", "swings",
     "hinge_work", "stopped", "springs", "triggered",
 )  # fmt: skip
-"""Those that are left out where they are empty."""
+"""Arrays that are left out if they are empty."""
 
 HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 """Readers of an array's shape and type, by the version of its format."""
 
 SMALL = 1 << 20
-"""Bytes up to which an array may be packed to any share of its size."""
+"""Arrays of up to so many bytes may be compressed by any factor."""
 
 MOST_UNPACKED = 150
-"""How many times as large as packed a larger array may be: runs in which next to nothing happens
-come to 60, and a file that is made to fill the memory to 1000."""
+"""Largest compression factor of larger arrays: runs in which almost nothing happens reach 60, a
+file made to fill the memory 1000."""
 
 LEVEL = 4
-"""Of zlib: those above take twice the time for 2 % of a crowd's file, and for nothing of others."""
+"""Level of zlib: higher ones take twice the time and save 2 % of a crowd's file, and nothing of
+others."""
 
 FAR = 1e100
 """Bound on every number: energies and distances computed from it stay finite."""
 
 TABLES = ("events", "trajectory", "sensors", "loads", "wear")
-"""What `to_csv` can write; the last three only where they are asked for."""
+"""Tables that `to_csv` can write; the last three only on request."""
 
 COLUMNS = ("t", "particle", "other", "kind", "surface")
 """Fields of an event that events.csv begins with."""
 
 SAMPLES = 200
-"""Instants in trajectory.csv where no interval is asked for."""
+"""Default number of times in trajectory.csv."""
 
 MOST_ROWS = 1_000_000
-"""Rows of trajectory.csv, at most: beyond it no spreadsheet opens the file."""
+"""Most rows of trajectory.csv: spreadsheets do not open more."""
 
 
 class RecordingError(InputError):
@@ -128,8 +129,8 @@ def save(recording: Record, path: str | Path, *, tolerance: float = TOLERANCE) -
     path : path
         The file.
     tolerance : float
-        By how many radii of the smallest particle tracks of a crowd of `MANY` knots or more may be
-        off, up to 0.01; all other recordings, and all with 0, are kept to the last bit.
+        Largest error of tracks of a crowd of `MANY` knots or more, in radii of the smallest
+        particle, up to 0.01; other recordings, and all with 0, keep all bits.
 
     Raises
     ------
@@ -146,14 +147,14 @@ def save(recording: Record, path: str | Path, *, tolerance: float = TOLERANCE) -
     }
     packed: dict[str, Any] = {}
     if tolerance and recording.machine.interact and len(recording.knots) >= MANY:
-        # Too far off for whole numbers of what may be off: as it is.
+        # Places are too large for whole numbers of units: do not pack.
         with suppress(OverflowError):
             packed = packing.pack(recording, tolerance)
     with whole(path) as unfinished:
         if packed:
             few = {name: array for name, array in arrays.items() if name not in UNPACKED}
             _write(unfinished, _about(recording, PACKED), few | packed)
-        # What is packed so well that it would be refused is left as it is.
+        # An array that compresses so well that it would be refused is stored uncompressed.
         if not packed or not _fits(unfinished, packed):
             _write(unfinished, _about(recording), arrays)
     return path
@@ -167,7 +168,7 @@ def _write(path: Path, about: dict[str, Any], arrays: dict[str, Any]) -> None:
 
 
 def _fits(path: Path, packed: Mapping[str, NDArray[Any]]) -> bool:
-    """Return whether a file is not too small for what is unpacked of it."""
+    """Whether the compression factor of a file is credible."""
     knots, events = packed["when"].shape[-1], packed["whose"].shape[-1]
     most = max(KNOT.itemsize * knots, EVENT.itemsize * events, packed["sizes"].size)
     return bool(most <= max(SMALL, MOST_UNPACKED * path.stat().st_size))
@@ -176,19 +177,19 @@ def _fits(path: Path, packed: Mapping[str, NDArray[Any]]) -> bool:
 def load(path: str | Path) -> Record:
     """Read what `save` wrote.
 
-    Nothing is unpacked whose size is not known, and sane, before.
+    Nothing is unpacked before its size is known and credible.
 
     Raises
     ------
     RecordingError
-        If the file is missing, damaged, of another kind or of another version; or if it is too
-        large for what it holds, or holds what no run leaves.
+        If the file is missing, damaged, of another kind or of another version; or if its
+        compression factor or its content cannot come from a run.
     """
     path = Path(path)
     kind = "not a recording as `chutelab run --out` writes it"
     try:
         if path.exists() and not path.is_file():
-            # A pipe would be waited for.
+            # Opening a pipe would block.
             raise OSError(ESPIPE, "it is no regular file")  # noqa: TRY301
         with zipfile.ZipFile(path) as archive:
             about = json.loads(str(_array(archive, "about")))
@@ -206,19 +207,19 @@ def load(path: str | Path) -> Record:
     except _UnfitError as error:
         raise RecordingError(f"{path}: {kind}: {error}") from None
     except Exception as error:
-        # Damaged bytes come up as anything: from zipfile, zlib, tokenize, json, NumPy.
+        # Damaged bytes raise many kinds of errors: from zipfile, zlib, tokenize, json, NumPy.
         raise RecordingError(f"{path}: {kind} (recording.npz)") from error
     raise RecordingError(f"{path}: a recording of another version of chutelab; run its scene again")
 
 
 class _UnfitError(ValueError):
-    """What a file holds is not what a run leaves; the text says in what."""
+    """The content of a file cannot come from a run; the text says why."""
 
 
 def _array(archive: zipfile.ZipFile, name: str, room: int = 0) -> NDArray[Any]:
-    """Return one array of an archive; up to `room` bytes it may be packed to any share of them."""
+    """Return one array of an archive; up to `room` bytes it may be compressed by any factor."""
     info = archive.getinfo(f"{name}.npy")
-    # Other methods can make a million bytes of one.
+    # Other methods can expand one byte to a million.
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise _UnfitError(f"{name} is packed by another method")
     with archive.open(info) as entry, warnings.catch_warnings():
@@ -243,7 +244,7 @@ def _about(recording: Record, form: int = FORMAT) -> dict[str, Any]:
     """Return the header of the file."""
     return {
         "format": form,
-        # Only what was given: whether a key is there may mean something.
+        # Only keys that were given, since their presence may have a meaning.
         "scene": recording.scene.model_dump_json(by_alias=True, exclude_unset=True),
         "title": recording.title,
         "engine": recording.engine,
@@ -259,9 +260,10 @@ def _about(recording: Record, form: int = FORMAT) -> dict[str, Any]:
 
 
 def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
-    """Return what header and arrays hold; an error if they contradict each other or the scene.
+    """Return the recording in header and arrays; an error if they contradict each other.
 
-    Every index has to lead somewhere. The scene's text may be an older one, without later keys.
+    Every index has to be valid, and all must fit the scene. Its text may be older, without later
+    keys.
     """
     counts = about["steps"], about["contacts"]
     if about["engine"] not in ENGINES:
@@ -269,7 +271,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     if not all(type(count) is int and 0 <= count < 2**63 for count in counts):
         raise _UnfitError("steps and contacts in the header have to be whole numbers")
     scene = from_dict(json.loads(about["scene"]), about["title"])
-    # Of particles that were never released, any number is packed into next to nothing.
+    # Any number of particles that were never released compresses to almost nothing.
     room = 8 * (scene.count + 1)
     machine, is_packed = build(scene), about["format"] == PACKED
     arrays: dict[str, Any] = {
@@ -285,7 +287,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         if not _fits(path, packed):
             raise _UnfitError("tracks or events would be too large for the file")
         arrays |= packing.unpack(packed, arrays["offsets"], machine.particle)
-    about.pop("seconds", None)  # earlier files tell how long the run took
+    about.pop("seconds", None)  # earlier files have the time that the run took
     about.setdefault("gained", 0.0)  # ... and not this
     told = {name: about[name] for name in ("engine", "steps", "contacts", "gained")}
     told["air_loss"] = about.get("air_loss", 0.0)
@@ -376,8 +378,8 @@ def to_csv(
     only : collection of str
         Which of the five; by default the first two.
     coefficients : mapping, optional
-        Of "erosion", m³/J, and "abrasion", 1/Pa, as `wear.worn` takes them: volumes, m³, stand in
-        columns of their own in wear.csv.
+        "erosion", m³/J, and "abrasion", 1/Pa, as `wear.worn` takes them; wear.csv then has columns
+        with volumes, m³.
 
     Raises
     ------
@@ -402,8 +404,8 @@ def frame(recording: Record, table: str = "trajectory", *, step: float | None = 
     recording : Record
         What to show.
     table : {"trajectory", "events"}
-        Positions (m) and velocities (m/s) of all particles at even times (s); or what happened to
-        them, in SI units.
+        Positions (m) and velocities (m/s) of all particles at equal intervals (s); or their events,
+        in SI units.
     step : float, optional
         Interval of the trajectory, s; by default that of `instants`.
 
@@ -445,15 +447,15 @@ def _table(
 
 
 def instants(recording: Record) -> int:
-    """Return how many instants trajectory.csv has where no interval is asked for.
+    """Return the default number of times in trajectory.csv.
 
-    `SAMPLES`, or as many as keep it to `MOST_ROWS` rows.
+    It is `SAMPLES`, or fewer if it would have more than `MOST_ROWS` rows.
     """
     if not len(recording.knots):
         return 0
     first, last = recording.ends()
     whole = float(last["t"].max() - first["t"].min())
-    # A particle has a row at each instant of its track, and one more at most for where it begins.
+    # A particle has a row at each time within its track, and at most one more for its beginning.
     share = float((last["t"] - first["t"]).sum()) / whole if whole > 0.0 else float(len(first))
     return max(2, min(SAMPLES, 1 + int((MOST_ROWS - len(first)) / share))) if share else SAMPLES
 
@@ -480,7 +482,7 @@ def _trajectory(recording: Record, step: float | None) -> Iterator[Sequence[obje
     if step is None:
         times = np.linspace(begin, end, instants(recording)).tolist()
     else:
-        # An end that is a whole number of steps away belongs to the table, whatever rounding says.
+        # An end after a whole number of steps belongs to the table, whatever rounding gives.
         last = int((end - begin) / step * (1.0 + 1e-12))
         times = [min(begin + step * n, end) for n in range(last + 1)]
     for t in times:

@@ -1,9 +1,8 @@
-"""A stream as a whole: its flow and its fates, what it takes of the belt, how wide its paths are.
+"""A stream as a whole: flow, fates, the power that it needs, the envelope of its paths.
 
-A scene is a slice of the material on a belt, as thick as a particle: a stream whose material is
-``stream.width`` wide is width / (2 r) such slices side by side, and brings so many times the mass
-per time, and takes so many times the power, of the one that is simulated. Without a width, what is
-told per time is of the slice.
+A scene is a slice of the material on a belt, as thick as a particle. A stream that is
+``stream.width`` wide consists of width / (2 r) such slices side by side, and has so many times the
+mass flow and power of the simulated one. Without a width, rates are those of the slice.
 """
 
 from __future__ import annotations
@@ -27,34 +26,34 @@ FEWEST = 20
 """Least number of particles whose paths have an envelope."""
 
 MOST_PATHS = 400
-"""Paths of a stream that its envelope is made of, at most; of more, evenly chosen ones."""
+"""Most paths for the envelope of a stream; from more, some are chosen evenly."""
 
 JUMP = 5.0
 """Largest jump of an edge from one place to the next, in distances between places."""
 
 LATE = 2.0 / 3.0
-"""Share of the places from which on lines end where an edge runs back."""
+"""Beyond this share of the places, lines end where an edge turns back."""
 
 AHEAD = 1.0 / 60.0
-"""Share of the way, ahead and back, over which the direction of a cut is taken."""
+"""Share of the way, ahead and back, that defines the direction of a cut."""
 
 INSTANTS = 400
-"""Instants of the way at which paths are looked at."""
+"""Times along the way at which paths are sampled."""
 
 
 @dataclass(frozen=True, eq=False)
 class Envelope:
-    """The paths of a stream, cut across its way at S places: where 2, 50 and 98 % of them pass.
+    """Quantiles (2, 50, 98 %) of the paths of a stream on cuts across its way at S places.
 
     Attributes
     ----------
     middle : ndarray, (S, 2)
-        The way: where the particles of the stream are as long after their release, the median of
-        either coordinate, m. Places are evenly far from each other.
+        The way: medians of both coordinates of the stream's particles at equal times after their
+        release, m. Places are equally spaced.
     normal : ndarray, (S, 2)
         Unit vector across the way at each place, to its left.
     offset : ndarray, (3, S)
-        `QUANTILES` of how far to the left of the way the paths cross, m.
+        `QUANTILES` of the distances to the left of the way at which paths cross, m.
     """
 
     middle: Floats
@@ -71,9 +70,9 @@ def envelopes(recording: Record, places: int = 60) -> dict[str, Envelope]:
     """Return the envelopes of the streams of a recording, by name, each cut at so many places.
 
     A path is that of a particle from its release to its arrival on the outgoing belt, or to its
-    end. The way goes on as long as half of the paths do, and its lines do not jump. Streams have
-    none that are released all at once, or whose paths are fewer than `FEWEST`, or lead nowhere. Not
-    of a family.
+    end. The way goes on as long as half of the paths do, and its lines do not jump. A stream has no
+    envelope if it is released all at once, has fewer than `FEWEST` paths, or they lead nowhere. Not
+    for a family.
     """
     found = {}
     due = recording.machine.releases
@@ -116,8 +115,8 @@ def _envelope(recording: Record, own: Ints, end: Floats, places: int) -> Envelop
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
     offset = np.full((len(QUANTILES), places), np.nan)
     for s in range(places):
-        # A path crosses where it goes from behind the cut to ahead of it; of several crossings
-        # the one counts that is nearest in time to the way's.
+        # A path crosses where it goes from behind the cut to ahead of it; of several crossings the
+        # one nearest in time to the way's counts.
         along = paths @ tangent[s]
         along -= middle[s] @ tangent[s]
         passes = (along[:-1] <= 0.0) & (along[1:] > 0.0)
@@ -133,8 +132,8 @@ def _envelope(recording: Record, own: Ints, end: Floats, places: int) -> Envelop
         offset[:, s] = np.quantile(crossed @ normal[s], QUANTILES)
     found = Envelope(middle, normal, offset)
     jumps = np.hypot(*np.moveaxis(np.diff(found.lines, axis=1), 2, 0)).max(axis=0)
-    # Where half of the particles have come to lie, the cuts go through them, and lines jump, or the
-    # way turns round, and an edge runs back.
+    # Where half of the particles lie, cuts go through them and lines jump, or the way turns round
+    # and an edge runs back.
     back = np.sum(np.diff(found.lines, axis=1) * tangent[1:], axis=2).min(axis=0) < 0.0
     late = np.arange(1, places) > LATE * places
     broken = np.flatnonzero((jumps > JUMP * at[1]) | (back & late))
@@ -143,7 +142,7 @@ def _envelope(recording: Record, own: Ints, end: Floats, places: int) -> Envelop
 
 
 BLOCKS = 10
-"""Blocks of particles in the order of their arrival, whose spread tells a standard error."""
+"""Blocks of particles in the order of arrival, whose spread gives the standard error."""
 
 PER_BLOCK = 2
 """Particles in a block, at least."""
@@ -153,13 +152,13 @@ BELT_WORK = ENTRIES.index("belt_work")
 
 @dataclass(frozen=True)
 class Steady:
-    """What the outgoing belt needs for streams that go on and on, if it carries what arrives.
+    """The outgoing belt's power for steady streams, if it carries what arrives.
 
-    `rate` (t/h) is that of the streams whose rate was given as a mass per time, `power` (W) what
-    it takes to bring them to the belt's speed, slip heat included: the work on what has settled,
-    per mass, times the rate. It is None where nothing has settled. `error` is its standard error
-    (W), from blocks of particles; None without enough of them. `width` (m) is that of the material
-    that rate and power are of, None if they are of the slice that is simulated.
+    `rate` (t/h) is that of the streams whose rate was given as a mass per time. `power` (W) brings
+    them to the belt's speed, slip heat included: the work on settled particles, per mass, times the
+    rate. It is None if nothing has settled. `error` is its standard error (W), from blocks of
+    particles; None without enough of them. `width` (m) is that of the material for rate and power,
+    None if they belong to the simulated slice.
     """
 
     rate: float
@@ -182,12 +181,11 @@ class Steady:
 
 
 def works(recording: Record) -> Floats:
-    """Return what the outgoing belt has paid for each particle that settled on it, J, (N,).
+    """Return the outgoing belt's work on each particle that settled on it, J, (N,).
 
-    NaN of the others. Where particles do not meet each other and do not turn, that is
-    m v_b (v_b - v_x) of each that has landed, however its bounces go. Otherwise it is what the
-    ledger has of a particle since it arrived: of those that the run has settled, that go as fast
-    as the belt at the end, or that it has carried off.
+    NaN for the others. If particles neither meet nor rotate, it is m v_b (v_b - v_x) for each that
+    has landed, whatever its bounces. Otherwise it is the ledger's entry since arrival, for
+    particles that have settled, that have the belt's speed at the end, or that were carried off.
     """
     scene, machine = recording.scene, recording.machine
     found = np.full(recording.count, nan)
@@ -215,7 +213,7 @@ def works(recording: Record) -> Floats:
 
 
 def steady(recording: Record) -> Steady | None:
-    """Return what streams in t/h take of the outgoing belt; None without any that has arrived."""
+    """Return the power for streams in t/h on the outgoing belt; None if none has arrived."""
     scene = recording.scene
     fed = [stream.mass_rate for stream in scene.streams]
     came = np.isfinite(arrivals(recording)["t"]) if scene.outgoing is not None else np.zeros(0)
@@ -241,10 +239,10 @@ def steady(recording: Record) -> Steady | None:
 def _per_mass(recording: Record, paid: Floats, own: Bools) -> tuple[float, float]:
     """Return the work per mass of some particles, J/kg, and its standard error; NaN unless known.
 
-    The error is that of the mean of blocks. Where each particle is alone, a block is particles in
-    the order of arrival. Where they meet, what the belt pays for one it pays in part for those
-    that it pushes: there a block is what is paid, of all, from one arrival to a later one. The
-    first and the last of these blocks, in which the stream sets in and runs out, do not count.
+    The error is that of the mean of blocks. If particles do not meet, a block is a group of
+    particles in the order of arrival. If they meet, the belt's work on one goes in part to those
+    that it pushes: there a block is the work on all from one arrival to a later one. The first and
+    the last of these blocks, in which the stream begins and runs out, do not count.
     """
     came = arrivals(recording)["t"]
     order = np.argsort(came, kind="stable")
@@ -269,7 +267,7 @@ def _per_mass(recording: Record, paid: Floats, own: Bools) -> tuple[float, float
 
 
 FLOW = 8
-"""Least number of arrivals that tell a flow."""
+"""Least number of arrivals for a flow."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -281,21 +279,21 @@ class Crowd(Shown):
     particles : int
         How many there are.
     fates : dict of int
-        How many have which fate, see `arrival.fates`; all of them together.
+        Number of particles by fate, see `arrival.fates`.
     arrival, landing : dict of dict of float, or None
-        Of t (s), x (m), vx and vy (m/s), of those that came to the outgoing belt, or touched the
-        belt itself: ``mean``, ``spread`` (standard deviation), ``q02``, ``q50``, ``q98``, and under
-        ``count`` how many these are. None without an outgoing belt.
+        For t (s), x (m), vx and vy (m/s), of particles that came to the outgoing belt, or touched
+        the belt itself: ``mean``, ``spread`` (standard deviation), ``q02``, ``q50``, ``q98``, and
+        ``count``, their number. None without an outgoing belt.
     flow : float or None
-        t/h with which the middle half of the particles arrives, in the slice that is simulated;
-        None of fewer than `FLOW`.
+        Rate at which the middle half of the particles arrives in the simulated slice, t/h; None for
+        fewer than `FLOW`.
     whole_flow : float or None
-        The same of all the width of the material; None without a width.
+        The same for the material's whole width; None without a width.
     width : float or None
         Of the material, m.
     thick : dict of float
-        By stream, how far its outer paths are apart where the way to the belt is half done, m: 96 %
-        of the paths lie between. Only streams that have an envelope there.
+        By stream, the width of its envelope half-way to the belt, m: 96 % of the paths lie within.
+        Only streams that have an envelope there.
     """
 
     particles: int
@@ -308,9 +306,9 @@ class Crowd(Shown):
     thick: dict[str, float]
 
     def sheet(self, *, details: bool = False) -> Sheet:
-        """Return where the particles came, how fast, and where they went.
+        """Return arrivals, landings, speeds and fates.
 
-        Without `details` a spread that is rounding is 0.
+        Without `details` a spread by rounding is shown as 0.
         """
         rows: list[tuple[str, ...]] = []
         notes = [f"where they are, or went: {told_fates(self.fates)}"]
@@ -360,7 +358,7 @@ def told_fates(counts: dict[str, int]) -> str:
 
 
 def crowd(recording: Record) -> Crowd | None:
-    """Return a run of several particles as a whole; None of one."""
+    """Return a run of several particles as a whole; None for one."""
     scene = recording.scene
     if recording.count < 2:
         return None
@@ -385,9 +383,9 @@ def crowd(recording: Record) -> Crowd | None:
 
 
 def flows(recording: Record) -> tuple[float | None, float | None]:
-    """Return the flow onto the outgoing belt in t/h, of the slice and of all the width.
+    """Return the flow onto the outgoing belt in t/h, of the slice and of the whole width.
 
-    Either is None where too few arrive to tell, the second one without ``stream.width`` as well.
+    Both are None if too few arrive, the second one also without ``stream.width``.
     """
     scene = recording.scene
     if scene.outgoing is None:

@@ -1,7 +1,7 @@
-"""What there is to say of a run: notes, tables for people, and the JSON object.
+"""The summary of a run: notes, tables for people, and the JSON object.
 
-A note is there where there is something to say: particles that waited, got stuck or roll. It is a
-key of the object, and ``str`` says it below the tables.
+A note exists only if it applies: particles that waited, got stuck or roll. It is a key of the
+object, and ``str`` of it is printed below the tables.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ FORMAT = 1
 """Version of the object; keys are only ever added to a version."""
 
 STATIONS = 6
-"""Contacts of particle 0 that are listed where no theory speaks of them."""
+"""Contacts of particle 0 that are listed if there is no theory of them."""
 
 STILL = 1e-3
-"""m/s; a bed that trembles is slower, what slides or falls is not for long."""
+"""m/s; particles of a trembling bed are slower, sliding or falling ones only briefly."""
 
 
 @dataclass(frozen=True)
 class Stopped:
-    """A run that was ended before it was over, as ``--max-seconds`` does.
+    """A run that was stopped, as ``--max-seconds`` does.
 
-    How many particles were under way then, how many not yet released, and up to which time all that
-    happened is recorded, s.
+    Numbers of particles under way and not yet released, and the time up to which everything is
+    recorded, s.
     """
 
     particles: int
@@ -61,14 +61,14 @@ class Stopped:
 
 
 def stopped(recording: Record) -> Stopped | None:
-    """Return where a run was stopped; None if it was not."""
+    """Return when a run was stopped; None if it was not."""
     halted = recording.ended_by("stopped")
     if not halted.any():
         return None
     under_way = halted & recording.released
     t = float(recording.knots["t"].max(initial=0.0))
     if not recording.machine.interact:
-        # Each particle is simulated by itself: some are further on than others.
+        # Each particle is simulated alone, so some are further on than others.
         last = recording.knots["t"][recording.offsets[1:][under_way] - 1]
         due = recording.machine.releases.t[halted & ~recording.released]
         t = min(float(last.min(initial=t)), float(due.min(initial=t)))
@@ -80,8 +80,8 @@ def stopped(recording: Record) -> Stopped | None:
 class Waits:
     """Particles that were released late because their place was taken.
 
-    How many waited and were released, and how long these did at most and on average, s (0 if none
-    did); `never` is how many were due and found no place until the end of the run.
+    Number that waited and were released, and their longest and mean waiting time, s (0 if none
+    did); `never` is the number that were due and found no place until the end of the run.
     """
 
     particles: int
@@ -102,9 +102,10 @@ class Waits:
 
 
 def waits(recording: Record) -> Waits | None:
-    """Return which particles waited for a place; None if none did."""
+    """Return the particles that waited for a place; None if none did."""
     due, dt = recording.machine.releases.t, recording.machine.dt
-    # The pymunk engine releases at the beginning of a step: up to a step late is not waiting.
+    # The pymunk engine releases at the beginning of a step, so a delay of up to a step does not
+    # count.
     least = (1.0 + 1e-6) * dt if recording.engine == "pymunk" else 1e-9
     released = recording.select(Kind.RELEASE)
     late = released["t"] - due[released["particle"]]
@@ -120,9 +121,9 @@ def waits(recording: Record) -> Waits | None:
 
 @dataclass(frozen=True)
 class Plug:
-    """Particles that meet each other and lie still in the machine when a run is over.
+    """Interacting particles that lie still in the machine at the end of a run.
 
-    How many these are, and how many have left it or arrived on the outgoing belt.
+    Their number, and that of particles that have left it or arrived on the outgoing belt.
     """
 
     still: int
@@ -137,10 +138,10 @@ class Plug:
 
 
 def plugged(recording: Record) -> Plug | None:
-    """Return which particles got stuck; None if none did, or there was nowhere to go.
+    """Return the particles that got stuck; None if none did, or there was no way out.
 
-    Told of particles that meet, where some got through or an outgoing belt waits for them, of a
-    run that was not stopped. Still is what moves with less than `STILL`, and what has settled: its
+    For particles that meet, if some got through or there is an outgoing belt, in a run that was not
+    stopped. Particles are still if they are slower than `STILL`, or have settled: then their
     contacts are at rest, though a grain on trembling ones may be a little faster.
     """
     machine = recording.machine
@@ -161,7 +162,7 @@ def plugged(recording: Record) -> Plug | None:
 def air_drag(recording: Record) -> Drag | None:
     """Return what air drag would do, by the fastest moment of a recording.
 
-    None for mass points, and of a run that has it.
+    None for mass points, and for a run with air.
     """
     if recording.scene.air_density:
         return None
@@ -180,7 +181,7 @@ def air_drag(recording: Record) -> Drag | None:
 
 
 def squeezed(recording: Record) -> Squeeze | None:
-    """Return what rode into others by adhesion, see `machine.releases.squeeze`; or None."""
+    """Return the riders that overlap by adhesion, see `machine.releases.squeeze`; or None."""
     released = recording.select(Kind.RELEASE)
     released = released[recording.machine.releases.carried[released["particle"]]]
     radius = recording.radius[released["particle"]]
@@ -191,12 +192,12 @@ def squeezed(recording: Record) -> Squeeze | None:
 class Rolling:
     """Disks that settled on the outgoing belt without being carried by it.
 
-    A free disk stops slipping when its contact point runs with the belt. Its centre, v_x, may then
-    be far from the belt's speed v_b: it rolls, and the belt pays no more. Belt work so far and
-    m v_b (v_b - v_x) together are what loads that are carried take.
+    A free disk stops slipping when its contact point has the belt's speed. Its centre's speed v_x
+    may then differ much from the belt's speed v_b: it rolls, and the belt does no more work.
+    Carried loads would take the belt work so far plus m v_b (v_b - v_x).
 
-    `particles` is how many roll, `belt_work` what the outgoing belt has paid for all particles, J,
-    and `belt_work_carried` what it would have paid if those that roll were carried, J.
+    `particles` is the number that roll, `belt_work` the outgoing belt's work on all particles, J,
+    and `belt_work_carried` its work if those that roll were carried, J.
     """
 
     particles: int
@@ -214,7 +215,7 @@ class Rolling:
 
 
 def rolling(recording: Record) -> Rolling | None:
-    """Return what settled on the outgoing belt without being carried; None if nothing did."""
+    """Return the disks that settled on the outgoing belt without being carried, or None."""
     belt = recording.scene.outgoing
     if belt is None or belt.speed is None or np.all(recording.particle.inertia == 0.0):
         return None
@@ -230,9 +231,9 @@ def rolling(recording: Record) -> Rolling | None:
 
 
 def layers(recording: Record) -> tuple[float, float] | None:
-    """Return where the lowest and the highest layer of a bed land on the outgoing belt, x, m.
+    """Return the landing places of the lowest and the highest layer of a bed, x, m.
 
-    None if all are released at one height, or one of the two does not land there.
+    None if all are released at one height, or if one of the two does not land on the belt.
     """
     if recording.count < 2 or recording.scene.stream.bed_height == 0.0:
         return None
@@ -254,12 +255,12 @@ NOTES: dict[str, tuple[Callable[[Record], Any], str]] = {
                " `results.stream.Steady`"),
     "drag": (air_drag, "what air drag, left out, would do, see `theory.Drag`"),
 }  # fmt: skip
-"""Notes by their keys in the JSON object: reader and meaning, in the order in which they are told.
+"""Notes by their keys in the JSON object: reader and meaning, in the order of printing.
 """
 
 
 def facts(recording: Record, *, details: bool = False) -> str:
-    """Return how much there was of what, and how it ended, in two lines.
+    """Return counts of particles, events and ends, in two lines.
 
     With `details` also the engine and its steps.
     """
@@ -276,10 +277,10 @@ def facts(recording: Record, *, details: bool = False) -> str:
 
 
 def sheets(recording: Record, *, details: bool = False) -> list[Sheet]:
-    """Return the tables of a run, and what there is to know about it, a sheet each.
+    """Return the tables of a run and its notes, one sheet each.
 
-    Of several particles these are all of them; particle 0 alone comes after them with `details`.
-    With `details` errors are told down to rounding.
+    With several particles the tables are about all of them; with `details` particle 0 follows, and
+    errors are shown down to rounding.
     """
     together = crowd(recording)
     parts = [] if together is None else [together.sheet(details=details)]
@@ -291,7 +292,7 @@ def sheets(recording: Record, *, details: bool = False) -> list[Sheet]:
     if together is None:
         parts += nominal
     until = recording.scene.run.until
-    # Belt work goes on after the landing: `belt_work` above is until nothing slips any more.
+    # Belt work goes on after the landing; `belt_work` above counts until nothing slips.
     ends = {"landed": "the landing", "settled": "all have settled"}.get(
         str(until), f"t = {until} s"
     )
@@ -323,7 +324,7 @@ def sheets(recording: Record, *, details: bool = False) -> list[Sheet]:
 
 
 def _way(recording: Record) -> Sheet:
-    """Return where and when particle 0 touched or left something first, as no theory says it."""
+    """Return where and when particle 0 first touched or left surfaces, without theory."""
     own = recording.events[recording.events["particle"] == 0]
     own = own[np.isin(own["kind"], [Kind.SEPARATION, Kind.IMPACT, Kind.LANDING])][:STATIONS]
     rows = []
@@ -341,7 +342,8 @@ def _way(recording: Record) -> Sheet:
 
 
 LISTS: dict[str, dict[str, Quantity]] = {}
-"""What each particle has, a list each: rows of the registry by the two parts of their names."""
+"""Quantities of each particle, one list each: rows of the registry by the two parts of their
+names."""
 
 for _row in REGISTRY.values():
     if _row.of == "particle" and _row.name == _row.name.replace("SURFACE", "").replace(
@@ -373,13 +375,13 @@ OTHERS = {
     "error": ("object", "relative errors of particle 0 against the theory, and the largest"),
     "accuracy": ("object", "see `studies.accuracy`; null unless it was asked for"),
 }  # fmt: skip
-"""Keys that hold no list a particle: type and meaning. Null is what there is nothing to say of."""
+"""Keys without a list of particles: type and meaning. Null if they do not apply."""
 
 
 def summary(recording: Record, accuracy: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return a recording's numbers as plain lists and floats, None for what did not happen.
 
-    What they are `schema` says. Lists have one entry a particle. Lengths, times and energies are in
+    `schema` describes them. Lists have one entry per particle. Lengths, times and energies are in
     SI units, angles in degrees under names that end in ``_deg``.
     """
     error, scene = compare(recording), recording.scene

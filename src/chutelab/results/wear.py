@@ -1,10 +1,10 @@
-"""Wear: where along a surface particles strike and rub, in pieces of equal length.
+"""Wear: impacts and sliding along a surface, in pieces of equal length.
 
-Blows are taken from the events, with the velocity relative to the surface; what lasting contacts
-lose is the ledger's entry of the surface less that of its blows, laid along the tracks that touch
-it in proportion to what each loses and how fast it slips there. So the sums over the pieces are the
-ledger's; where several blows fall on one instant, one of them may give what another takes. Where
-one particle leans on several surfaces or rubs on others, that share is an estimate.
+Impacts are taken from the events, with the velocity relative to the surface. The loss of lasting
+contacts is the ledger's entry of the surface less that of its impacts. It is distributed along the
+tracks that touch the surface, in proportion to the loss of each and its slip there. So the sums
+over the pieces equal the ledger's; of several impacts at one instant, one may seem to give what
+another takes. If a particle leans on several surfaces or rubs on others, its share is an estimate.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from chutelab.util.errors import InputError, did_you_mean
 from chutelab.util.tables import Sheet, Shown, number
 
 PIECES: Final = 50
-"""Of a surface, of equal length."""
+"""Default number of pieces of a surface, of equal length."""
 
 MOST_PIECES: Final = 10_000
-"""Of a surface, and parts into which an interval between two knots is cut, at most."""
+"""Most pieces of a surface, and most parts of an interval between two knots."""
 
 BLOWS: Final = (Kind.IMPACT, Kind.LANDING)
 
 TOUCH: Final = 0.05
-"""Share of the radius up to which a particle that loses energy is taken to touch a surface."""
+"""Share of the radius; a particle that loses energy at a smaller gap counts as touching."""
 
 
 def finnie(angle: ArrayLike) -> Floats:
-    """Return f(γ) of Finnie's erosion, m k v² f(γ), of angles between velocity and face, rad.
+    """Return f(γ) of Finnie's erosion, m k v² f(γ); γ between velocity and face, rad.
 
     sin 2γ - 3 sin² γ below tan γ = 1/3, and cos² γ / 3 above (I. Finnie, Wear 3 (1960) 87-103, with
     a ratio of 2 of the normal to the tangential force).
@@ -48,26 +48,26 @@ def finnie(angle: ArrayLike) -> Floats:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Wear(Shown):
-    """What wears a surface, piece by piece, until the end of the run.
+    """Wear of a surface, piece by piece, until the end of the run.
 
     Attributes
     ----------
     name : str
         Of the surface.
     edges : ndarray, shape (P + 1,)
-        Of the pieces, along the surface as the scene has it, m; the drive pulley comes last,
+        Edges of the pieces, along the surface as in the scene, m; the drive pulley comes last,
         clockwise from its foremost point.
     places : ndarray, shape (P, 3, 2)
-        First point, middle and last point of each, m; of what moves as written in the scene.
+        First point, middle and last point of each, m; for moving surfaces as written in the scene.
     impact : ndarray, shape (P,)
-        Energy that blows lose along the normal, the ledger's restitution loss, J.
+        Energy lost along the normal, the ledger's restitution loss, J.
     sliding : ndarray, shape (P,)
-        Slip heat of blows and lasting contacts, the ledger's friction loss, J.
+        Slip heat of impacts and lasting contacts, the ledger's friction loss, J.
     erosion : ndarray, shape (P,)
-        Finnie's: the sum of m v² f(γ) over blows, J, with `finnie`; m³ with a coefficient k.
+        Finnie's: the sum of m v² f(γ) over impacts, J, with `finnie`; m³ with a coefficient k.
     abrasion : ndarray, shape (P,)
         Archard's: the sum of load times sliding distance, slip heat over µ, J; m³ with a
-        coefficient. NaN where the surface has no friction: then nothing recorded tells it.
+        coefficient. NaN if the surface has no friction: then the sliding distance is not recorded.
     unplaced : float
         Losses of lasting contacts for which no track was found on the surface, J.
     """
@@ -82,7 +82,7 @@ class Wear(Shown):
     unplaced: float
 
     def sheet(self, *, details: bool = False) -> Sheet:
-        """Return sums, and where the most is."""
+        """Return the sums, and the places of the largest values."""
         rows = []
         for key in KEYS:
             values = getattr(self, key)
@@ -103,7 +103,7 @@ def worn(
     erosion: float | None = None,
     abrasion: float | None = None,
 ) -> Wear:
-    """Return what wears a surface; see `Wear`.
+    """Return the wear of a surface; see `Wear`.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def worn(
     name : str
         Of the surface.
     pieces : int
-        How many pieces of equal length it is told for.
+        Number of pieces, of equal length.
     erosion, abrasion : float, optional
         Finnie's k, m³/J, and Archard's K/H, 1/Pa: volumes instead of relative numbers.
 
@@ -147,7 +147,7 @@ def worn(
 
 
 def check_coefficients(given: Mapping[str, float]) -> None:
-    """Raise an `InputError` if one of them is no positive number, or of nothing that is known."""
+    """Raise an `InputError` if one of them is not positive, or its name is unknown."""
     for key, value in given.items():
         if key not in KEYS[2:]:
             raise InputError(f"one of {', '.join(KEYS[2:])}", "coefficients", key)
@@ -156,7 +156,7 @@ def check_coefficients(given: Mapping[str, float]) -> None:
 
 
 class _Face:
-    """A surface, its pieces of equal length, and what touches it."""
+    """A surface, its pieces of equal length, and the particles that touch it."""
 
     def __init__(self, recording: Record, name: str, count: int) -> None:
         self.recording, self.machine, self.count = recording, recording.machine, count
@@ -166,7 +166,7 @@ class _Face:
         self.starts = np.cumsum([0.0, *(float(piece.way) for piece in self.own)])
         self.edges = np.linspace(0.0, self.starts[-1], count + 1)
         middle = 0.5 * (self.edges[1:] + self.edges[:-1])
-        # Ends beyond a joint are left off.
+        # Ends beyond a joint are left out.
         ways = np.stack([self.edges[:-1], middle, self.edges[1:]], axis=1)
         which = np.searchsorted(self.starts, middle, side="right") - 1
         self.places = np.stack(
@@ -177,18 +177,18 @@ class _Face:
         )
 
     def at_rest(self, places: Floats, times: Floats) -> Floats:
-        """Return where places (c, 2), m, are as the scene has the surface written."""
+        """Return places (c, 2), m, relative to the surface as written."""
         return places if self.mover is None else self.mover.at_rest(places, times)
 
     def along(self, places: Floats, which: Ints) -> Floats:
-        """Return how far along the surface places (c, 2) at its parts are, m."""
+        """Return the distances along the surface of places (c, 2) at its parts, m."""
         found = np.zeros(len(places))
         for k, piece in enumerate(self.own):
             found[which == k] = self.starts[k] + piece.along(places[which == k])
         return found
 
     def nearest(self, places: Floats) -> tuple[Floats, Ints]:
-        """Return how far places (c, 2), m, are from the surface, and from which of its parts."""
+        """Return the distances of places (c, 2), m, from the surface, and its nearest parts."""
         near, which = np.full(len(places), inf), np.zeros(len(places), dtype=np.int64)
         for k, piece in enumerate(self.own):
             gap = piece.gap(places)
@@ -196,7 +196,7 @@ class _Face:
         return near, which
 
     def velocity(self, places: Floats, times: Floats, normal: Floats, which: Ints) -> Floats:
-        """Return that of the surface (c, 2), m/s, at contact places with normals to a particle."""
+        """Return the surface's velocity (c, 2), m/s, at contact points with normals."""
         speed = np.zeros(len(places))
         rest = self.at_rest(places, times)
         for k, piece in enumerate(self.own):
@@ -212,7 +212,7 @@ class _Face:
         return moved
 
     def _turned(self, ways: Floats, times: Floats) -> Floats:
-        """Return directions (c, 2) as the surface at rest has them."""
+        """Return directions (c, 2) relative to the surface as written."""
         if self.mover is None:
             return ways
         c, s = np.cos(self.mover.turn * times), np.sin(self.mover.turn * times)
@@ -249,7 +249,7 @@ class _Face:
         ]
         lost = -0.5 * push * (into[0] + into[1])
         heat = -0.5 * drag * (slips[0] + slips[1])
-        # Finnie asks for the velocity of the centre relative to the face.
+        # Finnie's law has the velocity of the centre relative to the face.
         past = np.abs(((before - moved) * along).sum(-1))
         angle = np.arctan2(-into[0].clip(max=0.0), past)
         eroded = mass * (into[0] ** 2 + past**2) * finnie(angle)
@@ -258,9 +258,9 @@ class _Face:
         return [self.summed(way, way, of) for of in (lost, heat, eroded, rubbed)]
 
     def summed(self, begin: Floats, end: Floats, values: Floats) -> Floats:
-        """Return sums by piece, (P,), of values (c,) spread from one way (m) to another."""
+        """Return sums by piece, (P,), of values (c,) spread between two distances (m)."""
         low, high = np.minimum(begin, end), np.maximum(begin, end)
-        # Round the seam of a whole circle they are at one place.
+        # Across the seam of a whole circle the value is put at one place.
         high = np.where(high - low > 0.5 * self.edges[-1], low, high)
         first, last = (
             np.searchsorted(self.edges, way, side="right").clip(1, self.count) - 1
@@ -276,7 +276,7 @@ class _Face:
         return found
 
     def rubs(self, sums: list[Floats]) -> float:
-        """Add what lasting contacts lose to the sums; return what could not be placed, J."""
+        """Add the loss of lasting contacts to the sums; return the part without a place, J."""
         entries = ledger(self.recording).by_surface[self.machine.surfaces[self.surface]]
         told = entries["restitution_loss"], entries["friction_loss"]
         touching, unplaced = self._touching(), 0.0
@@ -285,7 +285,7 @@ class _Face:
             if abs(lost) <= 1e-12 * sum(map(abs, told)):
                 continue
             if lost < 0.0 < whole:
-                # Blows at one instant: the ledger has what they lose together.
+                # For impacts at one instant the ledger has their joint loss.
                 sums[row] *= whole / sums[row].sum()
             elif weight.any():
                 share = lost * weight / weight.sum()
@@ -298,7 +298,7 @@ class _Face:
         return unplaced
 
     def _touching(self) -> _Touching:
-        """Look at the particles that touch the surface while they lose energy."""
+        """Find the particles that touch the surface while they lose energy."""
         knots, owner = self.recording.knots, self.recording.owner
         h = np.diff(knots["t"])
         losses = np.diff(knots["entries"][:, 1:], axis=0).clip(min=0.0)
@@ -327,7 +327,7 @@ class _Face:
         omega = knots["omega"][left] + share * (knots["omega"][left + 1] - knots["omega"][left])
         along = np.stack([normal[:, 1], -normal[:, 0]], axis=-1)
         slip = np.abs(((velocity - moved) * along).sum(axis=-1) + radius * omega)
-        # Where it slips at one speed, or not at all, by time.
+        # If it slips at one speed, or not at all, weight by time.
         mean = np.bincount(left, slip / looks, len(knots))[left]
         by_slip = np.divide(slip, mean, out=np.ones_like(slip), where=mean > 0.0)
         begin, end = (
@@ -341,7 +341,7 @@ class _Face:
     def _center(self, left: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
         """Return velocity (c, 2), m/s, times, s, and places (c, 2), m, as the surface is written.
 
-        Of centres at shares of the intervals after knots.
+        For centres at shares of the intervals after knots.
         """
         knots = self.recording.knots
         places, velocity = hermite(knots, left, share)
@@ -350,12 +350,12 @@ class _Face:
 
 
 class _Touching(NamedTuple):
-    """Looks (c,) at particles that touch a surface while they lose energy."""
+    """Samples (c,) of particles that touch a surface while they lose energy."""
 
-    begin: Floats  # m, along the surface, from where ...
-    end: Floats  # ... to where
+    begin: Floats  # start along the surface, m
+    end: Floats  # end along the surface, m
     friction: Floats
-    weights: tuple[Floats, Floats]  # of restitution and friction losses, J
+    weights: tuple[Floats, Floats]  # restitution and friction losses, J
 
 
 def over(heat: Floats, friction: Floats) -> Floats:
@@ -366,12 +366,12 @@ def over(heat: Floats, friction: Floats) -> Floats:
 
 @kept
 def wear(recording: Record, name: str) -> Wear:
-    """Return what wears a surface, in 50 pieces, without coefficients."""
+    """Return the wear of a surface, in 50 pieces, without coefficients."""
     return worn(recording, name)
 
 
 def touched(recording: Record) -> dict[str, Wear]:
-    """Return the wear of all surfaces that anything wears, by their names."""
+    """Return the wear of all surfaces that have any, by their names."""
     every = {name: wear(recording, name) for name in recording.machine.surfaces}
     return {
         name: one for name, one in every.items() if any(getattr(one, key).any() for key in KEYS[:3])

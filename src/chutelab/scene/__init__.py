@@ -2,14 +2,14 @@
 
 Here are `Scene`, what reads, overrides, validates and writes it, and the shipped scenes.
 
-- `units`: sizes with their units, and what a key may hold: strict types and ranges.
-- `materials`: particles and what they are made of; presets with their spread and sources.
-- `quantities`: the registry of a run's quantities, from which all that names them comes.
-- `conflicts`: what no single key can answer for.
+- `units`: sizes with their units; strict types and ranges of keys.
+- `materials`: particles and their materials; presets with their spread and sources.
+- `quantities`: the registry of a run's quantities, the source of all their names.
+- `conflicts`: rules between several keys.
 - `tables`: the tables of a scene as frozen Pydantic models, with the defaults.
-- `schema`: all tables together, and what follows from one for another.
+- `schema`: all tables together, and defaults that depend on other tables.
 - `overrides`: keys by their full path: JSON Schema, limits, ``KEY=VALUE`` texts.
-- `messages`: what Pydantic says of a scene, in words; ``[live]``, whether its keys are there.
+- `messages`: Pydantic's errors in words; checks of the keys in ``[live]``.
 - `variants`: one scene with other values: ``--vary``, combinations, families.
 """
 
@@ -65,9 +65,9 @@ class SceneError(InputError):
     file
         The file, or a stand-in such as ``<scene>``.
     faults
-        What is wrong, at least one; a text if it is the whole file.
+        The faults, at least one; a text if it concerns the whole file.
     hint
-        What to do next, if there is something better than mending each fault.
+        What to do next, if there is something better than correcting each fault.
     """
 
     def __init__(self, file: str, faults: Sequence[Fault] | str, hint: str = "") -> None:
@@ -75,14 +75,14 @@ class SceneError(InputError):
             faults = [Fault("", None, faults)]
         first = faults[0]
         super().__init__(first.allowed, first.key, first.value, file)
-        # As `copy` and `pickle` will call it.
+        # The arguments for `copy` and `pickle`.
         self.args = file, faults, hint
         self.faults, self.hint = list(faults), hint
 
 
 @dataclass(frozen=True)
 class About:
-    """What the list of scenes says of one: name, title and what to look at."""
+    """Entry of the list of scenes: name, title and what to look at."""
 
     name: str
     title: str
@@ -115,12 +115,12 @@ def about() -> list[About]:
 
 
 def find(name_or_path: str | Path) -> Path:
-    """Return the file meant: one that exists, or else the shipped scene of this name.
+    """Return an existing file, or else the shipped scene of this name.
 
     Raises
     ------
     SceneError
-        If there is neither; it suggests shipped scenes.
+        If there is neither; the message suggests shipped scenes.
     """
     source = str(name_or_path)
     path = Path(source)
@@ -151,20 +151,20 @@ _LARGEST_FILE: Final = 1 << 20
 """Bytes; a scene of a few tables is a thousandth of it, /dev/zero has more."""
 
 _DEEPEST: Final = 20
-"""Levels of keys and lists; a scene has four, and what is deeper by much cannot even be copied."""
+"""Most levels of keys and lists; a scene has four, and much deeper ones cannot even be copied."""
 
 _MOST_DOTS: Final = 200
 """Dots between two signs that end a key or a value."""
 
 Overrides = str | Override | Mapping[str, object] | Iterable["Overrides"]
-"""What is laid over a scene: a text ``KEY=VALUE``, values by key, or several of these."""
+"""Overrides of a scene: a text ``KEY=VALUE``, values by key, or several of these."""
 
 
 class Scene(SceneTables):
     """A validated scene, all defaults filled in that need no geometry.
 
-    Of tables of which there may be one or several, `particles`, `plates` and `streams` are all;
-    `stream` is the first, `particle` its kind, and `plate` the one at a distance from the pulley.
+    `particles`, `plates` and `streams` have all tables of their kind; `stream` is the first,
+    `particle` its kind, and `plate` the one at a distance from the pulley.
 
     Raises
     ------
@@ -189,13 +189,13 @@ class Scene(SceneTables):
         ----------
         values
             By full path, such as ``plate.angle_deg``, ``surface.hood.speed`` or
-            ``surface[0].speed``; also whole tables. None takes a key away, so that it has its
-            default. A whole float such as 3.0 will do for a whole number.
+            ``surface[0].speed``; also whole tables. None removes a key, so that it has its default.
+            A whole float such as 3.0 is accepted for a whole number.
 
         Raises
         ------
         SceneError
-            With all values that the scene refuses, and those that do not go together.
+            With all values that the scene refuses, and those that contradict each other.
 
         Examples
         --------
@@ -207,7 +207,7 @@ class Scene(SceneTables):
         return from_dict(to_dict(self), self.source, overrides)
 
     def alone(self) -> Scene:
-        """Return the scene with its first particle only; nothing is expected of that, nor shown."""
+        """Return the scene with its first particle only, without expectations and view."""
         tables = to_dict(self)
         streams = tables.get("stream", {})
         first = streams[0] if isinstance(streams, tuple) else streams
@@ -221,7 +221,7 @@ class Scene(SceneTables):
 
 
 AnyScene = Scene | str | Path | Mapping[str, Any]
-"""What `load` makes a scene of, and so does every function that takes a scene."""
+"""Everything that `load`, and every function that takes a scene, accepts."""
 
 
 def load(scene: AnyScene, overrides: Overrides = (), *more: Overrides) -> Scene:
@@ -231,10 +231,10 @@ def load(scene: AnyScene, overrides: Overrides = (), *more: Overrides) -> Scene:
     ----------
     scene
         A file; the name of a shipped scene, with or without ``.toml``; the tables of a file as
-        nested mappings; or a scene, which is validated anew if something is laid over it.
+        nested mappings; or a scene, which is validated again if there are overrides.
     overrides, *more
-        Laid over the scene, the last one wins: texts ``KEY=VALUE``; mappings of values by full
-        path, or nested as in the file; or lists of these.
+        Overrides; the last one wins: texts ``KEY=VALUE``; mappings of values by full path, or
+        nested as in the file; or lists of these.
 
     Raises
     ------
@@ -258,7 +258,7 @@ def load(scene: AnyScene, overrides: Overrides = (), *more: Overrides) -> Scene:
     if isinstance(scene, Mapping):
         return from_dict(scene, overrides=overrides)
     found = find(scene)
-    # Of a shipped scene its name says more than a path inside an environment.
+    # For a shipped scene its name says more than a path inside an environment.
     source = found.stem if found != Path(scene) else str(found)
     return parse(_read(found, source), source, overrides)
 
@@ -289,13 +289,13 @@ def parse(text: str, source: str = "<scene>", overrides: Overrides = ()) -> Scen
 
 @lru_cache(16)
 def _sound(text: str, source: str) -> Scene:
-    """Return the scene of a text as it stands; a scene never changes, so one is enough."""
+    """Return the scene of a text; a scene never changes, so it is cached."""
     return from_dict(_document(text, source), source)
 
 
 def _document(text: str, source: str) -> dict[str, Any]:
     """Read TOML."""
-    # For a key of many parts tomllib takes time with their number squared.
+    # For a key of many parts tomllib takes time proportional to their number squared.
     if any(part.count(".") > _MOST_DOTS for part in re.split(r"[][{},=\n]", text)):
         raise SceneError(source, "not TOML to be read: a key is nested too deep")
     try:
@@ -303,8 +303,8 @@ def _document(text: str, source: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise SceneError(source, [_syntax_fault(text, str(error))]) from None
     except (ValueError, RecursionError):
-        # tomllib passes on what Python itself refuses: dates out of the calendar, integers of
-        # thousands of digits, arrays nested a thousand deep.
+        # tomllib raises Python's own errors for impossible dates, integers of thousands of digits,
+        # and arrays nested a thousand deep.
         text = "not TOML to be read: a value is too large or nested too deep"
         raise SceneError(source, text) from None
     return document
@@ -336,7 +336,7 @@ def from_dict(
     except ValidationError as error:
         found = faults_of(error, document)
         faulty = {fault.key for fault in found}
-        # A table that is only misspelt is not missing.
+        # A misspelt table is not reported as missing, too.
         tables = [field.alias or name for name, field in Scene.model_fields.items()]
         for key in document.keys() - set(tables):
             faulty.update(nearest(key, tables))
@@ -352,9 +352,9 @@ def from_dict(
 
 
 def _halves(value: object, path: tuple[str | int, ...] = ()) -> Iterator[Fault]:
-    """Yield the texts of a document, its keys too, that have halves of characters.
+    """Yield the texts of a document, keys included, that have lone surrogates.
 
-    Bytes of a command line that are no UTF-8 come as these; no file could be written with them.
+    Bytes of a command line that are not UTF-8 become such; no file could be written with them.
     """
     match value:
         case str() if not value.isascii() and any("\ud800" <= one <= "\udfff" for one in value):
@@ -374,7 +374,7 @@ _POINT: Final = re.compile(r"\[\n\s+([-+\w.]+),\n\s+([-+\w.]+),\n\s*\]")
 def to_toml(scene: Scene, comment: str = "") -> str:
     """Return the keys of a scene that were set, as the text of a scene file.
 
-    Its ``[[expect]]`` are left out: they were promised for another scene.
+    Its ``[[expect]]`` are left out: they belong to another scene.
 
     Parameters
     ----------
@@ -389,14 +389,14 @@ def to_toml(scene: Scene, comment: str = "") -> str:
     """
     tables = to_dict(scene)
     tables.pop("expect", None)
-    # tomli-w writes a line for each number of a list; no text holds a line break as it stands.
+    # tomli-w writes a line for each number of a list; texts contain no raw line breaks.
     text = _POINT.sub(r"[\1, \2]", tomli_w.dumps(tables))
     remark = "".join(f"# {printable(line)}".rstrip() + "\n" for line in comment.splitlines())
     return f"{remark}\n{text}" if remark else text
 
 
 def plain(value: object, levels: int = _DEEPEST) -> Any:
-    """Copy a value as `tomllib` would have made it: of dicts, lists and Python's own numbers.
+    """Copy a value as `tomllib` would return it: of dicts, lists and Python's own numbers.
 
     A RecursionError if there are more levels than `levels`.
     """
@@ -412,7 +412,7 @@ def plain(value: object, levels: int = _DEEPEST) -> Any:
 
 
 def _traced(fault: Fault, given: Mapping[str, str]) -> Fault:
-    """Add to a fault which override it came from, if one."""
+    """Add the override to a fault, if it came from one."""
     for path, typed in given.items():
         if not typed:
             continue

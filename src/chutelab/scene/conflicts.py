@@ -1,10 +1,10 @@
-"""Rules that concern several keys or tables: conflicts between them.
+"""Rules that concern several keys or tables.
 
-Every rule speaks only when a comparison is *true*. A `Look` answers NaN for a key that is itself at
-fault, and no comparison with NaN is true: so the rules work on a half-broken scene, and all faults
-of a file come out in one message. Rules about one row of a table are data, `RULES`, of which the
+Every rule reports a fault only if a comparison is *true*. A `Look` returns NaN for a key that is
+itself at fault, and no comparison with NaN is true. So the rules work on a partly invalid scene,
+and all faults of a file come in one message. Rules about one row of a table are data, `RULES`; the
 live page gets those that it needs. No page may evaluate text, so `tree` turns a formula into lists
-that a small evaluator (``pictures/live/assets/formula.ts``) walks.
+for a small evaluator (``pictures/live/assets/formula.ts``).
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from chutelab.util.errors import MISSING, Fault, did_you_mean
 
 THEORY: Final = "theory"
 UNPROMISED: Final = "none"
-"""What an expectation may have for its value and for a tolerance."""
+"""Allowed words for the value and a tolerance of an expectation."""
 
 
 class ConflictError(ValueError):
-    """Carries the faults of a rule through Pydantic's validation."""
+    """Passes the faults of a rule through Pydantic's validation."""
 
     def __init__(self, faults: Sequence[Fault]) -> None:
         super().__init__("; ".join(str(fault) for fault in faults))
@@ -47,13 +47,13 @@ class ConflictError(ValueError):
 
 
 EITHER: Final = {"particle": "particles", "plate": "plates", "stream": "streams"}
-"""Tables of which a file has one, ``[stream]``, or several, ``[[stream]]``; all of them in code."""
+"""Tables that a file has once, ``[stream]``, or several times, ``[[stream]]``; lists in code."""
 
 ALWAYS: Final = ("particle", "stream", "run")
-"""Tables that a scene has without writing them."""
+"""Tables that a scene has even if they are not written."""
 
 JOINTS: Final = ("string", "rod", "spring", "pin")
-"""Tables of what joins particles with points, or with each other; as `Tie` in layout.h."""
+"""Tables of joints between particles, or with points; as `Tie` in layout.h."""
 
 MOTIONS: Final = ("turn", "shake", "travel")
 """Keys by which the motion of a surface is prescribed."""
@@ -61,16 +61,17 @@ MOTIONS: Final = ("turn", "shake", "travel")
 HINGED: Final = (
     "hinge", "mass", "inertia", "spring", "rest_deg", "damper", "stops_deg", "motor",
 )  # fmt: skip
-"""Keys of a surface that hangs on a hinge."""
+"""Keys of a hinge."""
 
 WAITS = ("opens_when", "closes_when", "starts_when")
-"""Keys of what waits until another surface is touched."""
+"""Keys of triggers, which wait until another surface is touched."""
 
 NO_MACHINE: Final = ("sensor", "expect", "view", "live")
-"""Tables that say nothing of the machine."""
+"""Tables that do not concern the machine."""
 
 LEAST_VIEW: Final = 1e-6
-"""Least width and height of a ``[view]``, m: less is not told apart far from the origin."""
+"""Least width and height of a ``[view]``, m: smaller ones vanish in rounding far from the
+origin."""
 
 LIST: Final = (list, tuple)
 
@@ -86,7 +87,7 @@ OPERATORS: Final[dict[type[ast.AST], str]] = {
 
 
 class _Dotted(ast.NodeTransformer):
-    """Makes one name of a quantity such as ``landing.x``."""
+    """Turns a quantity such as ``landing.x`` into a single name."""
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.Name:
         return ast.Name(ast.unparse(node), ast.Load())
@@ -104,7 +105,7 @@ def tree(formula: str, *, dotted: bool = False) -> Any:
 
     Numbers and truth values stand for themselves, and a text is a name.
 
-    Raises a `ValueError` if there is something in it that pages do not know.
+    Raises a `ValueError` for anything that pages cannot evaluate.
 
     Examples
     --------
@@ -113,7 +114,7 @@ def tree(formula: str, *, dotted: bool = False) -> Any:
     >>> tree("transfer(**throw, rebound='as-printed').v3x")
     ['.', ['call', 'transfer', [], [['throw'], ['rebound', ['text', 'as-printed']]]], 'v3x']
 
-    `dotted` takes quantities for names:
+    With `dotted`, quantities are names:
 
     >>> tree("1000 * ledger.belt_work", dotted=True)
     ['*', 1000, 'ledger.belt_work']
@@ -158,7 +159,7 @@ def _of(node: ast.expr) -> Any:
 
 
 class Row:
-    """A table, or one of several, sound or not; keys that are not written have their defaults."""
+    """A table, or one of several, valid or not; keys that are not written have their defaults."""
 
     def __init__(self, look: Look, table: str, number: int) -> None:
         found: Any = look.document.get(table)
@@ -176,17 +177,17 @@ class Row:
         return f"{self.head}.{key}"
 
     def given(self, key: str) -> bool:
-        """Whether the key is written out, sound or not."""
+        """Whether the key is written, valid or not."""
         return self.content.get(key) is not None
 
     def sound(self, key: str = "") -> bool:
-        """Whether a key, or else all of the table, is not at fault."""
+        """Whether a key, or the whole table, is valid."""
         return self._look.sound(self.path(key) if key else self.head)
 
     def __getitem__(self, key: str) -> Any:
-        """Return the value of a key, or its default; NaN if it is at fault or its table absent.
+        """Return the value of a key, or its default; NaN if it is invalid or its table absent.
 
-        A name in code, such as `from_`, does for the key.
+        A name in code, such as `from_`, is accepted for the key.
         """
         key = key.rstrip("_")
         path, look = f"{self.head}.{key}", self._look
@@ -199,20 +200,19 @@ class Row:
         return self._defaults[key] if self._there else math.nan
 
     def fault(self, key: str, allowed: str) -> Fault:
-        """Say that a key has a value that it should not have."""
+        """Report that a key has a value that it should not have."""
         return Fault(self.path(key), self[key], allowed)
 
     def missing(self, key: str, wanted: str) -> Fault:
-        """Say that a key is missing."""
+        """Report that a key is missing."""
         return Fault(self.path(key), MISSING, wanted)
 
 
 class Look:
-    """Read-only look at a scene's tables, as its file has them or as it dumps them, sound or not.
+    """Read-only view of a scene's tables, as in its file or dumped, valid or not.
 
-    `defaults` has those of the keys of each table; `faulty` holds the full paths that are already
-    known to be at fault, `asked` the keys whose values were asked for: the rules can depend on no
-    others.
+    `defaults` has the defaults of the keys of each table; `faulty` the full paths of invalid keys;
+    `asked` the keys that were read, on which alone the rules can depend.
     """
 
     def __init__(
@@ -228,7 +228,7 @@ class Look:
         self._rows: dict[str, list[Row]] = {}
 
     def sound(self, path: str) -> bool:
-        """Whether neither the key, nor its table, nor anything inside it is at fault."""
+        """Whether the key, its table and everything inside it are valid."""
         return not self.faulty or not any(
             f == path
             or f.startswith((path + ".", path + "["))
@@ -237,7 +237,7 @@ class Look:
         )
 
     def has(self, table: str) -> bool:
-        """Whether the table is there, sound or not; one that is only misspelt is at fault."""
+        """Whether the table exists, valid or not; a misspelt one counts as invalid."""
         return self.document.get(table) not in (None, (), []) or table in self.faulty
 
     def row(self, table: str) -> Row:
@@ -245,7 +245,7 @@ class Look:
         return Row(self, table, 0)
 
     def rows(self, table: str, least: int = 0) -> list[Row]:
-        """Return all of a table of which there may be several; at least so many."""
+        """Return all rows of a table; at least so many."""
         if table not in self._rows:
             found = self.document.get(table)
             one = isinstance(found, dict) and table in EITHER
@@ -260,7 +260,7 @@ class Look:
 
 
 RULES: Final[dict[str, list[list[str]]]] = {}
-"""By tables: keys, when, what the page says, what Python says; the file says what they mean."""
+"""By tables: keys, condition, text of the page, text in Python; explained in the file."""
 
 for tables, written in tomllib.loads(
     (Path(__file__).parent / "rules.toml").read_text(encoding="utf-8")
@@ -276,7 +276,7 @@ def compiled(formula: str) -> CodeType:
 
 
 class _Names(dict[str, Any]):
-    """What names in a rule stand for: what is known here, all others by a function."""
+    """Values of names in a rule: those given, all others by a function."""
 
     def __init__(self, other: Callable[[str], Any], **known: Any) -> None:
         super().__init__(known)
@@ -289,7 +289,7 @@ class _Names(dict[str, Any]):
 def contradictions(
     look: Look, table: str, rows: Sequence[Row], kinds: Sequence[Row] = (), count: float = math.nan
 ) -> Iterator[Fault]:
-    """Yield what `RULES` find in rows of a table, where there are so many particles of kinds."""
+    """Yield the faults that `RULES` find in rows of a table."""
     run = look.row("run")
 
     def near(a: object, b: object) -> bool:
@@ -360,7 +360,7 @@ def _tables(look: Look) -> Iterator[Fault]:
     if needy and not look.has("incoming"):
         need = "needs" if len(needy) == 1 else "need"
         yield Fault("incoming", MISSING, f"{' and '.join(needy)} {need} the table [incoming]")
-    # A plate without a pivot may be meant for either sort: what it lacks is another fault.
+    # A plate without a pivot may be meant for either kind; the missing key is another fault.
     damps |= any(not plate.given("pivot") for plate in plates)
     if look.row("outgoing")["drop_from"] == "impact" and not damps:
         text = 'needs the table [plate]; without one write outgoing.drop_from = "top"'
@@ -368,7 +368,7 @@ def _tables(look: Look) -> Iterator[Fault]:
 
 
 def _names(look: Look) -> Iterator[Fault]:
-    """Report names that are given twice, that are missing, or that nothing has."""
+    """Report names that are given twice, missing, or unknown."""
     surfaces: dict[object, str] = {}
     for table in (*SURFACES, "particle", "stream", "material", "sensor"):
         known = surfaces if table in SURFACES else {}
@@ -408,7 +408,7 @@ def _there_are(names: Sequence[str]) -> str:
 
 
 def _references(look: Look) -> Iterator[Fault]:
-    """Say if what waits for a touch, or a pair, names something that is not there."""
+    """Report triggers and pairs that name something unknown."""
     # Skip checks of references if names are invalid.
     if not all(map(look.sound, SURFACES)):
         return
@@ -440,7 +440,7 @@ def _references(look: Look) -> Iterator[Fault]:
 
 
 def _mass(look: Look, kind: Row) -> Iterator[Fault]:
-    """Say if the density of a kind of round particles gives too small a mass."""
+    """Report a density of round particles that gives too small a mass."""
     radius = kind["radius"]
     if radius == 0.0 or kind["shape"] in ("box", "polygon"):
         return
@@ -502,7 +502,7 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
 
 
 def _width(stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:
-    """Say if a stream is narrower than its slice."""
+    """Report a stream that is narrower than its slice."""
     name = stream["particle"]
     kind = next((kind for kind in kinds if kind["name"] == name), kinds[0])
     radius, width = kind["radius"], stream["width"] if stream.given("width") else math.nan
@@ -517,7 +517,7 @@ def _width(stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:
 
 
 def _pieces(look: Look) -> Iterator[Fault]:
-    """Say if surfaces and their copies are more pieces than an engine can look at."""
+    """Report surfaces and copies with more pieces than an engine can handle."""
     count = look.has("incoming") + look.has("outgoing")
     count += len(look.rows("plate")) + 4 * len(look.rows("conveyor"))
     for surface in look.rows("surface"):
@@ -543,7 +543,7 @@ def _pieces(look: Look) -> Iterator[Fault]:
 
 
 def stream_name(row: int) -> str:
-    """Return what a stream is called that has no name of its own."""
+    """Return the name of a stream that has none."""
     return f"stream{row + 1}" if row else "stream"
 
 

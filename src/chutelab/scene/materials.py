@@ -1,4 +1,4 @@
-"""Particles and what they are made of: ``[[material]]``, and presets with spread and sources.
+"""Particles and their materials: ``[[material]]``, and presets with spread and sources.
 
 A coefficient of restitution or friction belongs to a pair. A material has three: with itself, with
 steel (chutes, plates) and with the rubber of a belt.
@@ -44,7 +44,7 @@ DENSEST: Final = 22_590.0
 
 
 class Material(Table):
-    """What particles are made of; a pair that is not given is as the material with itself."""
+    """The material of particles; for a pair that is not given, the values with itself hold."""
 
     name: Name = described(..., "Unique name, for particle.material")
     density: Density = described(..., "Density of the solid, without the voids of a heap", "kg/m³")
@@ -123,7 +123,7 @@ class Particle(Resolved):
 
     @property
     def outline(self) -> tuple[tuple[float, float], ...]:
-        """Corners of a box or polygon about its centroid, m; () of what is round."""
+        """Corners of a box or polygon about its centroid, m; () if it is round."""
         if self.size is not None:
             x, y = 0.5 * self.size[0], 0.5 * self.size[1]
             return ((-x, -y), (x, -y), (x, y), (-x, y))
@@ -131,12 +131,12 @@ class Particle(Resolved):
 
     @property
     def span(self) -> tuple[float, float] | None:
-        """The range of its radii, m; None if all are alike."""
+        """The range of its radii, m; None if all are equal."""
         span: tuple[float, float] | None = self._typed.get("radius")  # type: ignore[assignment]
         return span
 
     def mean_of(self, mass: Any) -> Any:
-        """Return the mean mass, kg, if one of the mean radius has a mass (kg): it goes with r³."""
+        """Return the mean mass, kg, given the mass (kg) at the mean radius; mass goes with r³."""
         if self.span is None:
             return mass
         low, high = self.span
@@ -145,12 +145,12 @@ class Particle(Resolved):
 
     @property
     def moment(self) -> float:
-        """I/(m r²) of a disk or sphere that turns, 0 of one that does not."""
+        """I/(m r²) of a disk or sphere that rotates, 0 of one that does not."""
         return 0.0 if not self.spin else 0.4 if self.shape == "sphere" else 0.5
 
 
 class Pair(Table):
-    """What two meet with, instead of what their tables or materials say."""
+    """Values of a pair, which override those of tables and materials."""
 
     between: Two = described(..., "Two kinds of particles by name, or one and a surface")
     restitution: Share | None = pair_restitution(None, "of these two")
@@ -165,24 +165,24 @@ class Pair(Table):
 
     @property
     def clings(self) -> str | None:
-        """The key by which the two pull at each other, or None."""
+        """The key of the cohesion of the pair, or None."""
         return next((key for key in ("cohesion", "bond_number") if getattr(self, key)), None)
 
 
 @dataclass(frozen=True)
 class Preset:
-    """A material that is there by its name."""
+    """A built-in material."""
 
     material: Material  # its numbers
-    about: str  # what is meant by the name, in a few words
-    # the lowest and the highest that is usual, of each of `VALUES`
+    about: str  # meaning of the name, in a few words
+    # the usual range of each of `VALUES`
     spread: Mapping[str, tuple[float, float]]
-    sources: Mapping[str, tuple[str, ...]]  # where each of `VALUES` and its spread are from
+    sources: Mapping[str, tuple[str, ...]]  # source of each of `VALUES` and its spread
 
 
 @cache
 def presets() -> dict[str, Preset]:
-    """Return `PRESETS`, read from ``materials.toml``, which says what a row holds."""
+    """Return `PRESETS`, read from ``materials.toml``, where the rows are explained."""
     tables = tomllib.loads((Path(__file__).parent / "materials.toml").read_text(encoding="utf-8"))
     sources, found = tables.pop("sources"), {}
     for name, table in tables.items():
@@ -197,7 +197,8 @@ def presets() -> dict[str, Preset]:
 
 
 PRESETS: dict[str, Preset]
-"""The materials that every scene may name; few name one, and they take 14 ms to read."""
+"""The built-in materials; read when first needed, since that takes 14 ms and few scenes name
+one."""
 
 
 def __getattr__(name: str) -> dict[str, Preset]:

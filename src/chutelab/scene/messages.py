@@ -1,8 +1,7 @@
-"""What is wrong with a scene, in words: Pydantic's errors, and keys of ``[live]``, as faults.
+"""Faults of a scene in words: Pydantic's errors, and invalid keys of ``[live]``.
 
-A fault has the key's full path, and what is allowed. Of ``[live]`` only each key and value by
-itself is judged: whether a preset goes together with the rest is for the page to say, as of
-everything that is changed there.
+A fault has the key's full path, and what is allowed. In ``[live]`` each key and value is checked
+only by itself; the page checks whether a preset fits the rest, as for every change there.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ Location = tuple[str | int, ...]
 LISTS: Final = (
     "material", "pair", "conveyor", "surface", "string", "rod", "spring", "pin", "sensor", "expect",
 )  # fmt: skip
-"""Tables that are always lists; of those in `EITHER` there may be one or several."""
+"""Tables that are always lists; those in `EITHER` may also be single."""
 
 _WORDS: Final = {
     "number": "a number",
@@ -47,10 +46,10 @@ _SIGNS: Final = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exc
 
 
 def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:
-    """Say every error of a validation in words, one fault a key, in the order of the models' keys.
+    """Return every error of a validation in words, one fault per key, in the order of the models.
 
-    Conflicts between keys are left out: `scene.conflicts` finds them, also in a scene whose
-    validation never came to them.
+    Conflicts between keys are left out: `scene.conflicts` finds them, also if validation did not
+    get that far.
     """
     faults: dict[Location, Fault] = {}
     for detail in error.errors(include_url=False):
@@ -64,7 +63,7 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
             text = unknown(parts)
         else:
             if missing and isinstance(parts[-1], int):
-                # A point with one coordinate: show what is there, not what is not.
+                # A point with one coordinate: show the given value, not the missing one.
                 parts, missing = parts[:-1], False
             # The location of a union's error ends with the name of the member that refused.
             while (rule := rule_at(parts)) is None:
@@ -74,7 +73,7 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
             text = str(cause) if cause else allowed if missing else f"must be {allowed}"
         value = MISSING if missing else at_path(document, parts)
         if value is MISSING and not missing:
-            # Of keys that were given as tables inside each other.
+            # For keys that were given as nested tables.
             value = detail["input"]
         if len(parts) == 1 and parts[0] in LISTS and isinstance(value, Mapping):
             text = f"head it [[{parts[0]}]], with two brackets each: there may be several"
@@ -91,7 +90,7 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
 
 
 def _phrases(rule: Mapping[str, Any]) -> list[str]:
-    """Say a rule of the JSON Schema in words: a phrase for each alternative."""
+    """Describe a rule of the JSON Schema in words: a phrase for each alternative."""
     if "anyOf" in rule:
         return [phrase for choice in rule["anyOf"] for phrase in _phrases(choice)]
     if "x-words" in rule:
@@ -132,7 +131,7 @@ def _listed(choices: Iterable[str]) -> str:
 
 
 def unknown(parts: Sequence[str | int]) -> str:
-    """Say that a key is unknown, and which one was probably meant."""
+    """Report that a key is unknown, and which one was probably meant."""
     *above, last = parts
     key, known = str(last), _keys(above)
     homes = [
@@ -155,7 +154,7 @@ def _keys(table: Sequence[str | int]) -> list[str]:
 
 
 def live_faults(document: Mapping[str, Any], live: Live) -> Iterator[Fault]:
-    """Yield the keys of ``[live]`` that a scene has not, and the values that a key cannot have.
+    """Yield keys of ``[live]`` that the scene lacks, and values that a key cannot have.
 
     `document` is the scene's tables, which are valid.
     """
@@ -188,7 +187,7 @@ def live_faults(document: Mapping[str, Any], live: Live) -> Iterator[Fault]:
         try:
             SceneTables.validated(changed)
         except ValidationError as error:
-            # Nothing of a change that does not go together with the rest.
+            # Whether the change fits the rest is not checked.
             for fault in faults_of(error, changed):
                 yield Fault(f"{path}.set", None, str(fault))
 
@@ -197,8 +196,8 @@ def live_of(scene: SceneTables, document: Mapping[str, Any]) -> dict[str, Any]:
     """Return ``[live]`` for a page: defaults filled in, and every key by index, not by name.
 
     `document` is the scene's tables as the page has them. If they measure the drop to the outgoing
-    belt from elsewhere than the scene, so do the drops that are returned: the belt is where it was
-    meant.
+    belt from another place than the scene, the drops are converted, so that the belt is where it
+    was meant.
     """
     live, out = scene.live, scene.outgoing
     lower = 0.0 if out is None else document["outgoing"]["drop"] - out.drop
@@ -222,7 +221,7 @@ def live_of(scene: SceneTables, document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _refused(document: Mapping[str, Any], key: str) -> str:
-    """Say why a text is no key of a scene that can be changed; "" if it is one."""
+    """Return why a text is not a changeable key of a scene; "" if it is one."""
     try:
         parts_of(key)
     except InputError:

@@ -38,7 +38,7 @@ class _TomlSchema(GenerateJsonSchema):
         return described
 
     def field_title_should_be_set(self, schema: Any) -> bool:
-        # "Pulley Radius" for pulley_radius says nothing that the key does not.
+        # Titles such as "Pulley Radius" for pulley_radius add nothing to the key.
         return False
 
 
@@ -57,7 +57,7 @@ def schema() -> dict[str, Any]:
 _schema = cache(schema)
 
 NAMED: Final = ("particle", "material", "plate", "conveyor", "surface", "stream", "sensor")
-"""Tables of which there may be several, with names."""
+"""Tables that may occur several times, with names."""
 
 _SEGMENT: Final = re.compile(rf"({WORDS})((?:\[\d{{1,9}}\])*)")
 _FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"
@@ -80,7 +80,7 @@ def parts_of(path: str) -> list[str | int]:
 
 
 def names_of(document: Mapping[str, Any]) -> dict[str, list[object]]:
-    """Return the names of tables of which there are several in a scene's file."""
+    """Return the names of tables that occur several times in a scene's file."""
     return {
         table: [row.get("name") if isinstance(row, Mapping) else None for row in rows]
         for table in NAMED
@@ -113,9 +113,9 @@ def at_path(document: Any, parts: Sequence[str | int]) -> Any:
 
 
 def value_at(scene: SceneTables, path: str) -> Any:
-    """Return what a scene has at a path, defaults filled in.
+    """Return the value at a path of a scene, defaults filled in.
 
-    `MISSING` if there is no such thing.
+    `MISSING` if there is none.
     """
     try:
         parts = resolved(to_dict(scene), path)
@@ -127,12 +127,12 @@ def value_at(scene: SceneTables, path: str) -> Any:
 
 
 def rule_at(parts: Sequence[str | int]) -> Mapping[str, Any] | None:
-    """Return what the JSON Schema says of a path; None where it leads nowhere."""
+    """Return the JSON Schema of a path; None if it leads nowhere."""
     rule: Mapping[str, Any] | None = _schema()
     for part in parts:
         if rule is None:
             return None
-        # Of what may be a table or a list of tables the one that the path goes on in.
+        # For a table or a list of tables take the alternative in which the path continues.
         below: list[Any] = []
         for choice in map(_referred, rule.get("anyOf", [rule])):
             if isinstance(part, str):
@@ -181,8 +181,8 @@ def _referred(rule: Mapping[str, Any]) -> Mapping[str, Any]:
 class Override:
     """A value to be laid over a scene, at the full path of its key.
 
-    The value is as `tomllib` would have read it; None takes the key away, so that it has its
-    default. `typed` is the option that it came from, for messages; "" for none.
+    The value is as `tomllib` would have read it; None removes the key, so that it has its default.
+    `typed` is the option that it came from, for messages; "" for none.
     """
 
     key: str
@@ -202,8 +202,8 @@ def apply(
     """Lay overrides over a scene's tables, in place and in order; the last one wins.
 
     Texts are as `read` takes them; a missing table is made; "4 mm" is a number where one is wanted.
-    Returns the faults of those that could not be laid over, and what was typed for each of the
-    others by the full path that it set.
+    Returns the faults of overrides that could not be applied, and for the others the typed text by
+    the full path that it set.
     """
     faults: list[Fault] = []
     given: dict[str, str] = {}
@@ -222,7 +222,7 @@ def apply(
 def sized(value: Any, path: Sequence[str | int] = ()) -> Any:
     """Copy a document, or what is at a path of one, with numbers for texts such as "4 mm".
 
-    Only where a number is wanted, and the text has its unit.
+    Only if a number is expected, and the text has its unit.
     """
     match value:
         case dict():
@@ -251,7 +251,7 @@ def value_of(text: str) -> object:
 
 
 def resolved(document: Mapping[str, Any], key: str) -> list[str | int]:
-    """Return the parts of a key; a table of which there are several goes by its index then.
+    """Return the parts of a key; tables that occur several times have their index.
 
     Raises an `InputError` if it is no path, or if it is not clear which of several tables is meant.
 

@@ -1,14 +1,14 @@
-"""The registry: every quantity of a run, a row each.
+"""The registry of all quantities of a run, one row each.
 
-From it come the names that scenes, sweeps, searches and lessons ask for, the keys of the JSON
-summary and their schema, the lists in ``--help``, the columns of sweeps, labels of plots, and what
-the page calls its numbers. `chutelab.results.quantities` reads them off a recording.
+It defines the names used by scenes, sweeps, searches and lessons, the keys of the JSON summary and
+their schema, the lists in ``--help``, the columns of sweeps, labels of plots, and the page's names
+of numbers. `chutelab.results.quantities` computes them from a recording.
 
 A name means the same everywhere. Each particle has a ``landing.x``: the bare name is for scenes of
-one particle, ``particles[0].landing.x`` is that of the first one of several, and with a statistic
-it is the stream's, ``landing.x.mean``. ``landing.count`` is how many have landed, and
-``by_stream.left.landing.x.mean`` is of the particles of one stream. The paper's symbols are those
-of particle 0.
+one particle; with several, ``particles[0].landing.x`` belongs to the first one, and with a
+statistic, ``landing.x.mean``, it is the stream's. ``landing.count`` is the number that have landed,
+and ``by_stream.left.landing.x.mean`` belongs to one stream. The paper's symbols are those of
+particle 0.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from typing import Any, Final, Literal, NamedTuple
 from chutelab.util.errors import did_you_mean
 
 Of = Literal["particle", "total", "nominal", "lone", "stream", "run"]
-"""What has a quantity: each particle; each particle, and the run their sum; particle 0, and others
-by a statistic; the only particle of a run; a stream, or all together; the run."""
+"""To what a quantity belongs: each particle; each particle, and their sum to the run; particle 0,
+and others by a statistic; the only particle of a run; a stream, or all together; the run."""
 
 Ending = Literal["any", "scene", "settled"]
-"""How a run must end for a quantity: it does not matter, as the scene says, or without slip."""
+"""How a run must end for a quantity: in any way, as the scene says, or without slip."""
 
 
 class Quantity(NamedTuple):
-    """A quantity of a run; ``SURFACE`` and ``SENSOR`` in it stand for any of these."""
+    """A quantity of a run; ``SURFACE`` and ``SENSOR`` stand for any name."""
 
     name: str
 
@@ -40,7 +40,7 @@ class Quantity(NamedTuple):
     of: Of = "particle"
 
     needs: tuple[str, ...] = ()
-    """Tables without which a scene has none."""
+    """Tables that a scene needs to have the quantity."""
 
     ending: Ending = "any"
 
@@ -48,13 +48,13 @@ class Quantity(NamedTuple):
     """Statistics that are columns of a sweep; "" is the quantity itself."""
 
     symbol: str = ""
-    """What the page calls it in short, the paper's symbol if there is one."""
+    """The page's short name of it, the paper's symbol if there is one."""
 
     theory: bool = False
     """Whether the closed form has it, too."""
 
     together: str = ""
-    """What a run of several particles has in its place."""
+    """The quantity that replaces it in a run of several particles."""
 
     @property
     def field(self) -> str:
@@ -63,7 +63,7 @@ class Quantity(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Its kind, which chooses what its errors are measured by: lengths by a length; or ""."""
+        """Its kind, which chooses the scale of its errors: lengths by a length; or ""."""
         return KINDS.get(self.unit, "")
 
 
@@ -77,7 +77,7 @@ STATISTICS: Final = {
     "q02": "2 % have less", "q25": "a quarter has less", "q50": "median",
     "q75": "three quarters have less", "q98": "98 % have less",
 }  # fmt: skip
-"""What is told of all particles together; those without a value do not count."""
+"""Statistics over all particles; those without a value do not count."""
 
 EVENTS: Final = {
     "separation": ("incoming", "the separation", "left the incoming belt"),
@@ -87,17 +87,17 @@ EVENTS: Final = {
     "impact.SURFACE": ("", "the impact on SURFACE", "met SURFACE"),
     "sensor.SENSOR": ("", "the first passage of SENSOR", "passed SENSOR"),
 }
-"""What happens to a particle, for the first time: the table that it needs, a noun and a verb."""
+"""First events of a particle: the table that they need, a noun and a verb."""
 
 NEEDED: Final = {event: EVENTS[event][0] for event in ("separation", "impact", "landing")}
 """Events of the transfer, and their surfaces; impacts on free surfaces go by name."""
 
 ENTRIES: Final = ("belt_work", "restitution_loss", "friction_loss")
 ENDINGS: Final = ("time", "landed", "settled", "exit", "stopped", "unreleased")
-"""Why a track ends; the last is that of a particle that was not released until the run was over."""
+"""Why a track ends; the last is for particles never released."""
 
 FIRST: Final = "particles[0]."
-"""What a quantity of particle 0 begins with; it has to where there are several particles."""
+"""Prefix of quantities of particle 0, required with several particles."""
 
 BOTH, MEAN, ITSELF = ("mean", "spread"), ("mean",), ("",)
 PAID: Final = "ledger.by_surface.outgoing.belt_work"
@@ -105,7 +105,7 @@ HEAT: Final = "ledger.by_surface.outgoing.friction_loss"
 
 
 def _event(event: str) -> Iterator[Quantity]:
-    """Yield the rows of what is known of each particle at an event, and how many it happened to."""
+    """Yield the rows of an event: quantities of each particle, and the count."""
     home, what, verb = EVENTS[event]
     needs = (home,) if home else ()
     for key, unit, text, swept in (
@@ -130,13 +130,13 @@ def _event(event: str) -> Iterator[Quantity]:
 
 
 def _paper(name: str, symbol: str, unit: str, meaning: str) -> Quantity:
-    """Return a row of what the paper tells of a transfer."""
+    """Return a row of one of the paper's quantities of a transfer."""
     needs = ("incoming", "plate")
     return Quantity(name, unit, meaning, "nominal", needs, symbol=symbol, theory=True)
 
 
 def _paid(name: str, unit: str, meaning: str, together: str, *, theory: bool = True) -> Quantity:
-    """Return a row of what the outgoing belt pays until nothing slips on it any more."""
+    """Return a row of the outgoing belt's work or heat until nothing slips on it."""
     return Quantity(
         name, unit, meaning, "lone", ("outgoing",), "settled", theory=theory, together=together
     )
@@ -145,7 +145,7 @@ def _paid(name: str, unit: str, meaning: str, together: str, *, theory: bool = T
 def _run(
     name: str, meaning: str, unit: str = "J", of: Of = "run", needs: str = "", **swept: Any
 ) -> Quantity:
-    """Return a row of what there is once a run."""
+    """Return a row of a quantity of the whole run."""
     return Quantity(name, unit, meaning, of, tuple(needs.split()), "scene", **swept)
 
 
@@ -154,7 +154,7 @@ LOADS: Final = {
     "along": ("N", "force that drags SURFACE along"),
     "torque": ("N m", "torque on SURFACE about its pivot"),
 }
-"""What a surface bears: unit and meaning."""
+"""Loads on a surface: unit and meaning."""
 
 WEAR: Final = {
     "impact": "energy that blows on SURFACE lose along the normal",
@@ -162,7 +162,7 @@ WEAR: Final = {
     "erosion": "Finnie's m v² f(γ) of blows on SURFACE",
     "abrasion": "Archard's load times sliding distance on SURFACE",
 }
-"""What wears a surface, see `results.wear`."""
+"""Wear of a surface, see `results.wear`."""
 
 PARTS: Final = {
     "mean": "mean over time",
@@ -173,7 +173,7 @@ PARTS: Final = {
 
 
 def _load(part: str, unit: str, meaning: str, statistic: str) -> Iterator[Quantity]:
-    """Yield the rows of what a surface bears; the pressing of the plate is told by sweeps, too."""
+    """Yield the rows of loads on a surface; the plate's normal load is a column of sweeps, too."""
     said = f"{meaning}, {PARTS[statistic]}"
     row = Quantity(f"loads.SURFACE.{part}.{statistic}", unit, said, "run", ("run.loads",), "scene")
     yield row
@@ -264,10 +264,10 @@ REGISTRY: Final = {
              columns=ITSELF),
     )
 }  # fmt: skip
-"""Every quantity by its name. What the ledger has is counted up to ``run.until``."""
+"""Every quantity by its name. The ledger counts up to ``run.until``."""
 
 THEORY: Final = {row.field: row for row in REGISTRY.values() if row.theory}
-"""What the closed form has, too, by its name there."""
+"""Quantities that the closed form has, too, by its names."""
 
 FORMER: Final = {
     "time": "track.t.mean", "restitution_loss": "ledger.restitution_loss",
@@ -275,7 +275,7 @@ FORMER: Final = {
     "plate_hits": "impact.count",
     **{f"landing.{key}_spread": f"landing.{key}.spread" for key in ("x", "vx", "vy")},
 }  # fmt: skip
-"""Names that quantities had once, and have now."""
+"""Former names of quantities, and their present ones."""
 
 
 def _told(row: Quantity, statistic: str) -> Quantity | None:
@@ -303,8 +303,8 @@ def lookup(name: str, surfaces: Collection[str], streams: Collection[str] = ()) 
     Names are such as ``x2``, ``landing.x``, ``particles[0].landing.x``, ``landing.x.mean``,
     ``arrival.vx.spread``, ``flight.t``, ``impact.ramp.t``, ``landing.count``, ``ended.settled``,
     ``ledger.belt_work``, ``ledger.kinetic.end`` or
-    ``ledger.by_surface.outgoing.belt_work``; the surfaces are all that the scene has. What has a
-    statistic or a count is also of one stream, by its name: ``by_stream.left.landing.x.mean``.
+    ``ledger.by_surface.outgoing.belt_work``; `surfaces` are all of the scene. Statistics and counts
+    exist for one stream, too: ``by_stream.left.landing.x.mean``.
 
     Examples
     --------
@@ -347,9 +347,9 @@ def _row(name: str, surfaces: Collection[str]) -> Quantity | None:
 
 
 def every(surfaces: Collection[str], count: int) -> Iterator[Quantity]:
-    """Yield all quantities of a scene that are of its whole run, in the order of the registry.
+    """Yield all quantities of a scene's whole run, in the order of the registry.
 
-    Of several particles what each has is told by mean and standard deviation.
+    With several particles their quantities have mean and standard deviation.
 
     >>> [row.name for row in every(["incoming"], 200)][:2]
     ['separation.t.mean', 'separation.t.spread']
@@ -371,7 +371,7 @@ def every(surfaces: Collection[str], count: int) -> Iterator[Quantity]:
 
 
 def whose(row: Quantity, count: int) -> str:
-    """Say how to name one of several particles; "" if the name does so already.
+    """Return how to name one of several particles; "" if the name does so already.
 
     Examples
     --------
@@ -387,7 +387,7 @@ def whose(row: Quantity, count: int) -> str:
 
 
 def suggestion(name: str, surfaces: Collection[str]) -> str:
-    """Say what a quantity is called now, or which one was probably meant, or which there are."""
+    """Return the present name of a quantity, or similar names, or all names."""
     if name in FORMER:
         return f"it is called {FORMER[name]} now"
     if "run.loads" not in surfaces and lookup(name, [*surfaces, "run.loads"]):
@@ -399,7 +399,7 @@ def suggestion(name: str, surfaces: Collection[str]) -> str:
     keys = ", ".join([*some, "contacts", "ledger.belt_work"])
     theirs = "phi1_deg to slip_heat, " if {"incoming", "plate"} <= {*surfaces} else ""
     there_are = f"there are {theirs}{keys} and other keys of `chutelab run --json`"
-    # A search for similar names takes long: of a thousand surfaces only some are looked at.
+    # A search for similar names takes long, so only some of a thousand surfaces are tried.
     known: list[str] = []
     for row in REGISTRY.values():
         statistics = STATISTICS if row.of == "particle" else ()

@@ -77,7 +77,7 @@ def _one_or_several(given: object) -> object:
 
 
 def _several(default: Any, **limits: Any) -> Any:
-    """Return a list of tables, for which the JSON Schema says that one table will do."""
+    """Return a list of tables, for which the JSON Schema also allows a single table."""
 
     def either(rule: dict[str, Any]) -> None:
         keys = ("type", "items", "minItems", "maxItems")
@@ -89,12 +89,12 @@ def _several(default: Any, **limits: Any) -> Any:
 
 
 def _usual() -> Any:
-    """Return a table with its defaults; it is made by the scene's validator, and needs no own."""
+    """Return a table with its defaults, made by the scene's validator."""
     return Field(default_factory=dict, validate_default=True)
 
 
 Reader = Callable[[Table, str], Any]
-"""Returns what a table has under a key."""
+"""Returns the value of a key of a table."""
 
 
 class SceneTables(Table):
@@ -138,9 +138,9 @@ class SceneTables(Table):
 
     _source: str = PrivateAttr("<scene>")
     _told: Any = PrivateAttr(None)
-    """What the core is told of it, see `chutelab.machine.builder.told`."""
+    """Data for the core, see `chutelab.machine.builder.told`."""
     _ahead: Any = PrivateAttr(None)
-    """What its machine has before it is built, see `chutelab.machine.builder.ahead`."""
+    """Its machine before it is built, see `chutelab.machine.builder.ahead`."""
 
     @classmethod
     def validated(cls, document: Mapping[str, Any]) -> Self:
@@ -194,21 +194,21 @@ class SceneTables(Table):
         return self
 
     def value(self, table: Table, key: str) -> Any:
-        """Return what one of its tables has under a key; arrays where those of a family differ."""
+        """Return the value of a key of one of its tables; an array if it varies in a family."""
         return getattr(table, key)
 
     def slices(self, number: int = 0, value: Reader = getattr) -> Any:
-        """Return how many slices a stream's material is wide, each one particle thick.
+        """Return the width of a stream's material in slices of one particle's thickness.
 
-        The width over the mean diameter of its particles; 1 without a width. What a slice takes, or
-        brings, per time is so many times less than what all of the material does.
+        It is the width over the mean diameter of its particles; 1 without a width. Rates of the
+        whole material are so many times those of a slice.
         """
         width, particle = value(self.streams[number], "width"), self.particles[self.kinds[number]]
         return 1.0 if width is None else width / (2.0 * value(particle, "radius"))
 
     @property
     def rate(self) -> Any:
-        """Particles per second of the first stream, of all its width."""
+        """Particles per second of the first stream, over its whole width."""
         return self.stream.rate * self.slices()
 
     @property
@@ -217,7 +217,7 @@ class SceneTables(Table):
         return self.count > 1 and any(stream.interact for stream in self.streams)
 
     def met(self, kind: int, other: int | str) -> tuple[float, float]:
-        """Return restitution and friction of a kind of particles and another, see `meetings`."""
+        """Return restitution and friction of two kinds of particles, see `meetings`."""
         return self.meetings()(kind, other)
 
     def passes(self, kind: int, other: int) -> bool:
@@ -232,7 +232,7 @@ class SceneTables(Table):
 
     @property
     def clings(self) -> bool:
-        """Whether any two pull at each other."""
+        """Whether there is any cohesion."""
         return any(pair.clings for pair in self.pair)
 
     @property
@@ -243,7 +243,7 @@ class SceneTables(Table):
     def cohesion(self, kind: int, other: int | str) -> float:
         """Return the force (N) that it takes to pull a kind off another, or off a surface.
 
-        A bond number tells it in weights of the lighter kind, of mean radius.
+        A bond number gives it in weights of the lighter kind at its mean radius.
         """
         name = other if isinstance(other, str) else self.particles[other].name
         names = {self.particles[kind].name, name}
@@ -254,11 +254,11 @@ class SceneTables(Table):
         return pair.bond_number * (mass * self.gravity)
 
     def meetings(self, value: Reader = getattr) -> Callable[[int, int | str], tuple[float, float]]:
-        """Return what tells restitution and friction of a kind and another kind, or a surface.
+        """Return a function for restitution and friction of two kinds, or a kind and a surface.
 
-        What ``[[pair]]`` says of the two counts first, then what the surface (or a stream of the
-        kind) says, then the material, then the default. Of two kinds that nothing is said of it is
-        the geometric mean of what each has with itself, a mixing rule that is as good as any.
+        Values come first from ``[[pair]]``, then from the surface (or a stream of the kind), then
+        from the material, then from the default. For two different kinds without a value it is the
+        geometric mean of the values of each with itself, a mixing rule that is as good as any.
         """
         tables: dict[str, Any] = {
             "incoming": self.incoming,
@@ -273,7 +273,7 @@ class SceneTables(Table):
             # The first one counts.
             names = frozenset(pair.between)
             pairs[names] = told | pairs.get(names, {})
-        # A function in a function that calls itself would only be freed by the garbage collector.
+        # No recursive inner function: only the garbage collector would free it.
         return partial(self._met, value, tables, pairs, {})
 
     def _met(
@@ -299,7 +299,7 @@ class SceneTables(Table):
             with_it = self.particles[other].name
             mine, theirs = (self._met(value, tables, pairs, known, k, k) for k in (kind, other))
             products: list[Any] = [a * b for a, b in zip(mine, theirs, strict=True)]
-            # A power of a half is no square root to the last bit.
+            # A power of ½ differs from a square root in the last bit.
             values = tuple(sqrt(p) if isinstance(p, float) else p**0.5 for p in products)
         restitution, friction = values
         said = pairs.get(frozenset((particle.name, with_it)), {}) if pairs else {}
@@ -310,13 +310,13 @@ class SceneTables(Table):
     def _own(
         self, value: Reader, particle: Particle, homes: Sequence[Any], column: str = ""
     ) -> Any:
-        """Return what tables say, else the material, else the default of the first."""
+        """Return the value of the tables, else of the material, else the default of the first."""
         if particle.material is None and len(homes) == 1:
             return value(homes[0], "restitution"), value(homes[0], "friction")
         material, values = self._material(particle), []
         for key in ("restitution", "friction"):
             said = [home for home in homes if key in home.model_fields_set]
-            # A material says nothing about the friction of the incoming belt.
+            # A material does not set the friction of the incoming belt.
             grips = key == "friction" and isinstance(homes[0], Incoming)
             if material is not None and not said and not grips:
                 values.append(value(material, key + column))
@@ -352,7 +352,7 @@ class SceneTables(Table):
 
     @property
     def surfaces(self) -> tuple[str, ...]:
-        """Names of its surfaces, as the ledger has them."""
+        """Names of its surfaces, in the order of the ledger."""
         tables = [name for name in ("incoming", "plate", "outgoing") if getattr(self, name)]
         return (*tables, *(str(free.name) for free in self.free))
 
@@ -368,7 +368,7 @@ class SceneTables(Table):
 
     @property
     def triggers(self) -> tuple[tuple[str, str, str], ...]:
-        """What waits for a touch: a surface, what it then does, and which one is to be touched."""
+        """Triggers: a surface, its action, and the surface to be touched."""
         named: list[tuple[str, Any]] = [(one.name or "plate", one) for one in self.plates]
         named += [(one.name, one) for one in self.surface]
         return tuple(
@@ -385,12 +385,12 @@ class SceneTables(Table):
 
     @property
     def hinges(self) -> bool:
-        """Whether something hangs on a hinge."""
+        """Whether there are hinges."""
         return any(one.hinge for one in self.movers.values())
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Names of all that quantities are told of: surfaces, and ``sensor.NAME`` of sensors.
+        """Names of all that has quantities: surfaces, and ``sensor.NAME`` for sensors.
 
         ``run.loads`` is among them if it is given.
         """
@@ -405,7 +405,7 @@ class SceneTables(Table):
         )
 
     def __eq__(self, other: object) -> bool:
-        # The same machine from another file is the same scene.
+        # Scenes of the same machine from different files are equal.
         return self.__dict__ == other.__dict__ if isinstance(other, SceneTables) else NotImplemented
 
     @model_validator(mode="after")
@@ -439,7 +439,7 @@ class SceneTables(Table):
         return self
 
     def density(self, particle: Particle, value: Reader = getattr) -> Any:
-        """Return the density that the mass of a kind of particles follows from; None if none."""
+        """Return the density from which the mass of a kind of particles follows, or None."""
         if particle.shape in ("box", "polygon"):
             return None
         material = self._material(particle)
@@ -447,7 +447,7 @@ class SceneTables(Table):
         return value(particle if own or particle.density is not None else material, "density")
 
     def _with_mass(self, particle: Particle) -> Particle:
-        """Return a kind of particles with its mean radius and the mass that goes with that."""
+        """Return a kind of particles with its mean radius and the mass at that radius."""
         density, shaped = self.density(particle), particle.shape in ("box", "polygon")
         span: Any = particle.radius
         if density is None and not isinstance(span, tuple) and not shaped:
@@ -479,7 +479,7 @@ class SceneTables(Table):
 def to_dict(scene: SceneTables, *, defaults: bool = False) -> dict[str, Any]:
     """Return the keys that were set, nested as in the file: `from_dict` makes the scene again.
 
-    One table is no list of one. With `defaults`, all keys.
+    A single table is not a list of one. With `defaults`, all keys.
     """
     tables: dict[str, Any] = scene.model_dump(
         by_alias=True, exclude_unset=not defaults, warnings=False
@@ -491,7 +491,7 @@ def to_dict(scene: SceneTables, *, defaults: bool = False) -> dict[str, Any]:
 
 
 def plain_number(value: object) -> object:
-    """Return a whole float as an integer, which will do for a float, but not the other way round.
+    """Return a whole float as an integer, which is accepted for a float, but not vice versa.
 
     Beyond 2**53 not every integer is a float.
     """

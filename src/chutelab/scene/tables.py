@@ -82,7 +82,7 @@ class Shake(Table):
 
 
 class Travel(Table):
-    """A way of a surface: evenly faster for half of the time, evenly slower for the rest."""
+    """Travel of a surface: constant acceleration for half of the time, then deceleration."""
 
     to: Point = described(..., "Where its pivot comes to rest [x, y]", "m")
     at: Amount = described(0.0, "When it begins", "s")
@@ -90,13 +90,13 @@ class Travel(Table):
 
 
 class When(Table):
-    """What something waits for."""
+    """Condition of a trigger."""
 
     touched: Name = described(..., "A surface: when the first particle touches it")
 
 
 class Motor(Table):
-    """What turns a hinge: as fast as this, as far as its torque is enough."""
+    """Motor of a hinge: it turns at this speed, as far as its torque suffices."""
 
     speed_deg: Turn = described(..., "Speed that it turns at, counterclockwise", "degrees/s")
     torque: Torque = described(..., "The most that it turns with", "N m")
@@ -147,7 +147,7 @@ class Moving(Table):
 
 
 class StillPlate(Table):
-    """The keys of a plate but those of its motion, which come behind them."""
+    """The keys of a plate except those of its motion, which follow them."""
 
     name: Name | None = described(None, "Name of a further plate, for events and the ledger")
     pivot: Point | None = described(None, "Of a further plate: its pivot [x, y]", "m")
@@ -216,7 +216,7 @@ class Conveyor(Table):
 
 
 class StillSurface(Table):
-    """The keys of a surface but those of its motion, which come behind them, and its copies."""
+    """The keys of a surface except those of its motion, which follow them, and its copies."""
 
     name: Name = described(..., "Unique name, for events and the ledger")
     from_: Point | None = described(None, "First end [x, y]", "m", alias="from")
@@ -264,8 +264,8 @@ class Surface(Moving, StillSurface):
     """A free surface, two-sided and without thickness: a chute, a hood, a floor, a peg, a gate.
 
     Straight, given by ``from`` and ``to`` or by ``points``; or an arc, by ``center`` and
-    ``radius``. The attribute `points`, ((x, y), ...), always has the answer of a straight one, and
-    `from_` and `to` are empty once it does; of an arc it is empty.
+    ``radius``. The attribute `points`, ((x, y), ...), always has the points of a straight one, and
+    `from_` and `to` are then empty; for an arc it is empty.
     """
 
     model_config = ConfigDict(
@@ -302,7 +302,7 @@ class Surface(Moving, StillSurface):
 
 
 class Joint(Table):
-    """What joins the centre of a particle with a point, or with that of another; without mass."""
+    """A joint from the centre of a particle to a point, or to another particle; without mass."""
 
     from_: Point | None = described(None, "Fixed end [x, y]", "m", alias="from")
     particle: Whole = described(0, "Number of the particle, over all streams, from 0", ge=0)
@@ -413,7 +413,7 @@ class Stream(Resolved):
 
     @property
     def mass_rate(self) -> float | None:
-        """The rate in kg/s, of all its width, if it was given as a mass per time."""
+        """The rate in kg/s, of its whole width, if it was given as a mass per time."""
         typed = self._typed.get("rate")
         return tonnes_per_hour(typed) / 3.6 if isinstance(typed, str) else None
 
@@ -468,7 +468,7 @@ class Run(Table):
 
 
 class Sensor(Table):
-    """A line across a stream that counts what passes. No engine looks at it."""
+    """A line across a stream that counts what passes. Engines ignore it."""
 
     name: Name = described(..., "Name of the sensor")
     from_: Point = described(
@@ -478,20 +478,20 @@ class Sensor(Table):
 
 
 class View(Table):
-    """What pictures, film and page show, instead of what they choose. No engine looks at it."""
+    """The window of pictures, film and page, instead of their own choice. Engines ignore it."""
 
     from_: Point = described(..., "Lower left corner [x, y]", "m", alias="from")
     to: Point = described(..., "Upper right corner [x, y]", "m")
 
 
 class Preset(Table):
-    """Values that go together, under one name: the Moon, a rough belt."""
+    """A set of values under one name: the Moon, a rough belt."""
 
     name: Text = described(..., "What it is called", min_length=1, max_length=40)
     set: Values = described(..., "Keys of the scene, and what they become")
 
     def __hash__(self) -> int:
-        # As equal ones have it, though values may be lists.
+        # Equal presets need equal hashes, though values may be lists.
         return hash((self.name, *self.set))
 
 
@@ -507,7 +507,7 @@ Presets = Annotated[
 
 
 class Live(Table):
-    """What the live page of the scene offers. No engine looks at it."""
+    """Settings of the scene's live page. Engines ignore them."""
 
     predict: Switch = described(
         False, "Whether path, landing and numbers are hidden until a mark is set and play pressed"

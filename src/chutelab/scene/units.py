@@ -1,4 +1,4 @@
-"""Sizes with their units, such as "0.5 mm" or "1e-3 J", and what a key of a scene may hold."""
+"""Sizes with units, such as "0.5 mm" or "1e-3 J", and the types and ranges of keys."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ from chutelab.util.errors import about_comma
 
 
 class Table(BaseModel):
-    """What all tables share: frozen, and unknown keys refused."""
+    """Base of all tables: frozen, unknown keys refused."""
 
-    # A table's validator is built where it is first needed; most are within that of a whole scene.
+    # A table's validator is built when first needed; most are part of that of a whole scene.
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     def _fill(self, key: str, value: object) -> None:
-        # A default that depends on another key: not counted among the keys that were set, so that
-        # a scene taken apart and changed gets it anew.
+        # A default that depends on another key does not count as set, so that a changed scene gets
+        # it again.
         object.__setattr__(self, key, value)
 
 
 class Resolved(Table):
-    """A table some of whose values are resolved, such as a rate in t/h; its file keeps the text."""
+    """A table with resolved values, such as a rate in t/h; its file keeps the text."""
 
     _typed: dict[str, object] = PrivateAttr(default_factory=dict)
 
@@ -70,8 +70,8 @@ UNITS: Final = {
     "%": ("%", 0.01),
     "": ("", 1.0),
 }
-"""Units that are understood, each as an SI unit (degrees for angles) and how many of those it is;
-% is a share, and "" what is only counted."""
+"""Known units, each as an SI unit (degrees for angles) and its factor; % is a share, and "" a
+count."""
 
 SIZE: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d,].*)?")
 """A number and its unit, if there is one."""
@@ -116,7 +116,7 @@ def read_any(text: str) -> tuple[float, str]:
 
 
 def size_in(text: str, unit: str) -> float | None:
-    """Return a size in the SI unit that it has to have; None if it has none, or another.
+    """Return a size in the required SI unit; None if it has none, or another.
 
     >>> size_in("4 mm", "m"), size_in("20°", "degrees"), size_in("4 s", "m"), size_in("4", "m")
     (0.004, 20.0, None, None)
@@ -126,7 +126,7 @@ def size_in(text: str, unit: str) -> float | None:
 
 
 def symbol(unit: str) -> str:
-    """Return a unit as tables and pictures have it.
+    """Return a unit as tables and pictures show it.
 
     >>> symbol("degrees"), symbol("m/s")
     ('°', 'm/s')
@@ -165,14 +165,15 @@ RESERVED_NAMES: Final = ("incoming", "plate", "outgoing", "particles")
 """Names in ledgers and events that a free surface may not take."""
 
 _SIGN: Final = r"""[^\s\x1c-\x1f\x85\ufeff.=\[\]"']"""
-"""Of a name. A character that is a blank to Python only, or to JavaScript only, is not allowed."""
+"""Pattern of a character of a name. Characters that are blank only in Python, or only in
+JavaScript, are not allowed."""
 
 WORDS: Final = f"{_SIGN}+(?: {_SIGN}+)*"
 NAME: Final = f"^{WORDS}$"
 """A free surface's name, such that an override can name it in a path."""
 
 LONGEST_NAME: Final = 40
-"""Characters of it."""
+"""Most characters of a name."""
 
 LARGEST: Final = 1e6
 """Bound on every dimensional quantity, SI: far beyond any chute, far from overflow in v⁴."""
@@ -183,28 +184,28 @@ SHORTEST: Final = 1e-9
 This and the following are far from underflow in squares and products, too."""
 
 LIGHTEST: Final = 1e-27
-"""kg; less than any atom has, of which the lightest has 1.7e-27 kg."""
+"""kg; less than the lightest atom, 1.7e-27 kg."""
 
 THINNEST: Final = 1e-3
-"""kg/m³; less than any solid has, and than air at a thousandth of its pressure."""
+"""kg/m³; less than any solid, and than air at a thousandth of its pressure."""
 
 BRIEFEST: Final = 1e-9
-"""s; less than a blow between the smallest grains lasts, which has no duration here."""
+"""s; shorter than an impact of the smallest grains, which has no duration here."""
 
 WEAKEST: Final = 1e-9
 """m/s²; the pull of a grain of 1 mm on another, about. For weaker gravity write 0."""
 
 SLOWEST: Final = 1e-9
-"""m/s; 3 cm in a year, as continents drift. What is slower stands still: write 0."""
+"""m/s; 3 cm in a year, as continents drift. For anything slower write 0."""
 
 MOST_PARTICLES: Final = 10_000_000
-"""Their knots alone would be gigabytes beyond this."""
+"""With more, the knots alone would be gigabytes."""
 
 MOST_SURFACES: Final = 1_000
 MOST_PIECES: Final = 10_000
 """Straight and bent pieces of all surfaces with their copies: engines look at each."""
 MOST_KINDS: Final = 100
-"""Of particles, and of streams."""
+"""Most kinds of particles, and most streams."""
 MOST_KEYS: Final = 200
 """Most that a page lists."""
 MOST_PRESETS: Final = 20
@@ -213,7 +214,7 @@ MOST_EXPECTATIONS: Final = 1_000
 
 
 def apart(first: Sequence[float], second: Sequence[float]) -> bool:
-    """Tell whether there is room for a surface between two points, m."""
+    """Whether two points, m, are far enough apart for a surface."""
     return hypot(second[0] - first[0], second[1] - first[1]) >= SHORTEST
 
 
@@ -237,7 +238,7 @@ def _free(name: str) -> str:
 
 
 def _must(holds: Callable[[Any], bool], words: str) -> AfterValidator:
-    """Refuse values that do not hold; say what they must be."""
+    """Refuse values that break a rule; say what they must be."""
 
     def judged(value: Any) -> Any:
         if not holds(value):
@@ -284,7 +285,7 @@ Frequency = Annotated[Number, Field(ge=1e-6, le=10_000.0)]
 
 
 class Worded:
-    """Says what a list is in words, for messages; `Field` would be overruled by that of a key."""
+    """Describes a list in words, for messages; a `Field` would be overruled by that of a key."""
 
     def __init__(self, words: str) -> None:
         self.words = words
@@ -296,7 +297,7 @@ class Worded:
 
 
 class OrLeast:
-    """Allows 0, or a number that is not less than the least that means something."""
+    """Allows 0, or a number that is at least the smallest meaningful one."""
 
     def __init__(self, least: float) -> None:
         self.least = least
@@ -306,7 +307,7 @@ class OrLeast:
     ) -> CoreSchema:
         def judged(number: float) -> float:
             if 0.0 < number < self.least:
-                # Its words are those of the JSON Schema.
+                # Its words are taken from the JSON Schema.
                 raise PydanticCustomError("least", "too small a number")
             return number
 
@@ -383,7 +384,7 @@ def is_convex(points: tuple[Point, ...]) -> bool:
 
 
 def _plain_sum(numbers: list[float]) -> float:
-    """Return a sum that is rounded after each number, as pages do; later Pythons' `sum` is not."""
+    """Return a sum that is rounded after each number, as in pages; newer Pythons' `sum` is not."""
     return reduce(add, numbers)
 
 
@@ -441,7 +442,7 @@ def tonnes_per_hour(text: str) -> float:
     return float(match[1]) if match else nan
 
 
-# A scene resolves both to a number, which is all that others see.
+# A scene resolves both to a number; other code sees only that.
 if TYPE_CHECKING:
     Rate = float
     Radius = float

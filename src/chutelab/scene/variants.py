@@ -1,4 +1,4 @@
-"""One scene, varied: which keys, and the values they take.
+"""Variants of one scene: the varied keys and their values.
 
 Scenes that differ in plain numbers only are a `Family`: one of them, and a column for each key.
 """
@@ -43,8 +43,8 @@ class Vary:
     """A key of the scene and the values it takes."""
 
     key: str  # full path of the key, such as plate.angle_deg or surface.hood.speed
-    values: tuple[float, ...]  # in the order they are gone through; in the key's unit
-    # what messages call it; on the command line as it was typed
+    values: tuple[float, ...]  # in the order of variation; in the key's unit
+    # its name in messages; on the command line as it was typed
     typed: str = field(default="", compare=False)
     # the unit that was written with the values, "" for none; `quantity` refuses a wrong one
     unit: str = field(default="", compare=False)
@@ -64,7 +64,7 @@ Varied = Sequence[Vary] | Mapping[str, Sequence[float | str]]
 
 @dataclass(frozen=True)
 class Range(Vary):
-    """A key of the scene and the two ends of what it may be, to draw samples from."""
+    """A key of the scene and the ends of a range from which samples are drawn."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -76,14 +76,14 @@ class Range(Vary):
 
 
 def refuse_texts(given: Any, option: str, example: str) -> None:
-    """Refuse what is written as on the command line; say what it is in Python."""
+    """Refuse the form of the command line; show that of Python."""
     texts = [given] if isinstance(given, str) else () if isinstance(given, Mapping) else given
     if any(isinstance(one, str) for one in texts):
         raise InputError(f"KEY=... is for the command line; in Python it is {example}", option)
 
 
 def varied(varies: Varied, kind: type[Vary]) -> list[Vary]:
-    """Return what is varied as a list of one kind, `Vary` or `Range`.
+    """Return the varied keys as a list of one kind, `Vary` or `Range`.
 
     It is given as such a list, or as values by key: numbers, or texts with a unit.
     """
@@ -104,7 +104,7 @@ def varied(varies: Varied, kind: type[Vary]) -> list[Vary]:
 def numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, ...], str]:
     """Return numbers, with or without unit, in the SI unit, and that unit; "" without one.
 
-    Raises an `InputError` if one is no number; it says `form`, what is allowed.
+    Raises an `InputError` if one is not a number; its message has `form`, what is allowed.
     """
     values, units = [], set()
     for part in parts:
@@ -122,17 +122,17 @@ def numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, .
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a varied key is."""
+    """Description of a varied key."""
 
     path: str  # the key as messages have it; free surfaces by index
-    # its definition, up to the first semicolon or colon; of a free surface, after its name
+    # its definition, up to the first semicolon or colon; for a free surface after its name
     label: str
     unit: str  # "" for a pure number; "degrees" for angles
     whole: bool = False  # whether it takes whole numbers only
 
 
 def quantity(scene: Scene, vary: Vary) -> Quantity:
-    """Return what a varied key of a scene is; an `InputError` if it is unknown, or no number."""
+    """Describe a varied key of a scene; an `InputError` if it is unknown, or not a number."""
     document = plain(to_dict(scene))
     faults, _ = apply(document, [Override(vary.key, plain_number(vary.values[0]))])
     if faults:
@@ -147,7 +147,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
         try:
             from_dict(document)
         except SceneError as error:
-            # What the scene says of it.
+            # The scene's definition of it.
             said = (one for one in error.faults if one.value is not MISSING)
             text = next((one.allowed for one in said if path.startswith(one.key)), text)
         raise InputError(text, vary.typed)
@@ -170,7 +170,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
 
 
 def quantities(scene: Scene, varies: Sequence[Vary]) -> tuple[Quantity, ...]:
-    """Return what each of the varied keys is; an `InputError` also if two are the same."""
+    """Describe each of the varied keys; an `InputError` also if two are equal."""
     found: list[Quantity] = []
     for vary in varies:
         one = quantity(scene, vary)
@@ -181,7 +181,7 @@ def quantities(scene: Scene, varies: Sequence[Vary]) -> tuple[Quantity, ...]:
 
 
 def count_of(varies: Sequence[Vary], most: float = inf) -> int:
-    """Return how many combinations there are; an `InputError` if there are more than `most`."""
+    """Return the number of combinations; an `InputError` if it is more than `most`."""
     total = prod(len(vary.values) for vary in varies)
     if total > most:
         counts = "".join(f"{len(vary.values)} × " for vary in varies[:-1])
@@ -191,11 +191,11 @@ def count_of(varies: Sequence[Vary], most: float = inf) -> int:
 
 
 MOST_SEEDS: Final = 1000
-"""Runs of one scene with other seeds; the error of their mean falls with the root of it only."""
+"""Most runs of one scene with other seeds; the error falls only with the root of their number."""
 
 
 def reseeded(scene: Scene, number: int) -> Scene:
-    """Return a scene that draws anew: `number` is added to the seed of each stream."""
+    """Return a scene with other draws: `number` is added to the seed of each stream."""
     if not number:
         return scene
     paths = [f"stream[{n}].seed" for n in range(len(scene.streams))]
@@ -206,7 +206,7 @@ def reseeded(scene: Scene, number: int) -> Scene:
 
 
 def drawn(scene: Scene, repeat: int, keys: Sequence[str] = ()) -> None:
-    """Refuse a number of seeds that there cannot be, or of a scene in which nothing is drawn.
+    """Refuse an invalid number of seeds, or a scene in which nothing is drawn.
 
     Raises an `InputError`; `keys` are those that vary.
     """
@@ -228,7 +228,7 @@ COORDINATES: Final = ("at", "center", "pivot", "points", "velocity")
 
 
 def is_plain(path: str) -> bool:
-    """Tell whether scenes that differ in a key, or a coordinate, are a `Family`: a plain number."""
+    """Whether scenes that differ in a key, or a coordinate, are a `Family`: a plain number."""
     parts = parts_of(path)
     key = next(part for part in reversed(parts) if isinstance(part, str))
     single = isinstance(parts[-1], str) or key in COORDINATES
@@ -236,7 +236,7 @@ def is_plain(path: str) -> bool:
 
 
 def accepted(path: str, values: Floats) -> Bools:
-    """Tell which values a key that `is_plain` takes, (N,), if nothing else is looked at."""
+    """Return which values a key that `is_plain` accepts by itself, (N,)."""
     rule = rule_at(parts_of(path)) or {}
     low, high = limits_of(rule) or (nan, nan)
     too_little = rule.get("not", {"exclusiveMinimum": low, "exclusiveMaximum": low})
@@ -245,9 +245,9 @@ def accepted(path: str, values: Floats) -> Bools:
 
 
 class Judge:
-    """Tells which scenes contradict themselves that differ in some keys, each right by itself.
+    """Finds scenes that contradict themselves, among variants whose keys are valid by themselves.
 
-    Expectations ask for no number that varies: they are left out.
+    Expectations do not concern varied numbers, so they are left out.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -255,10 +255,10 @@ class Judge:
         self.asked: set[str] = set()
 
     def finds(self, values: Mapping[str, float]) -> bool:
-        """Tell whether the scene with some values, by full path, has a fault.
+        """Whether the scene with some values, by full path, has a fault.
 
-        Each call takes all keys that vary. `asked` has the keys whose numbers have decided that;
-        others do not.
+        Each call takes all keys that vary. `asked` has the keys whose values decided the result;
+        others have no effect.
         """
         apply(self._document, [Override(key, value) for key, value in values.items()])
         look = Look(self._document, DEFAULTS)
@@ -269,12 +269,12 @@ class Judge:
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Scenes that differ in plain numbers only: a batch, of which each is a row of numbers.
+    """Scenes that differ only in plain numbers: a batch, one row of numbers each.
 
-    There is a row for each of the N particles, in turn of all of a scene.
+    There is a row for each of the N particles, scene by scene.
     """
 
-    scene: Scene  # one of them, validated: what does not vary is its
+    scene: Scene  # one of them, validated, with the values that do not vary
     columns: Mapping[str, Floats]  # the numbers of each key that varies, by its full path
     each: int = 1  # particles of a scene, which do not meet and are of one kind
 
@@ -283,14 +283,14 @@ class Family:
 
     @cached_property
     def firsts(self) -> Family:
-        """The same with one row a scene."""
+        """The same with one row per scene."""
         if self.each == 1:
             return self
         return Family(self.scene, {key: rows[:: self.each] for key, rows in self.columns.items()})
 
     @cached_property
     def _own(self) -> dict[tuple[int, str], dict[tuple[int, ...], Floats]]:
-        """The columns by table and key, and by where in its list they belong; () without one."""
+        """The columns by table and key, and by their place in a list; () without one."""
         found: dict[tuple[int, str], dict[tuple[int, ...], Floats]] = {}
         for path, numbers in self.columns.items():
             table, key, place = self._home(path)
@@ -298,7 +298,7 @@ class Family:
         return found
 
     def _home(self, path: str) -> tuple[Table, str, tuple[int, ...]]:
-        """Return the table that a path leads to, its key there, and where in the key's list."""
+        """Return the table of a path, its key there, and the place in the key's list."""
         parts, place = list(parts_of(path)), tuple[int, ...]()
         while isinstance(parts[-1], int):
             place = (int(parts.pop()), *place)
@@ -319,10 +319,10 @@ class Family:
         return found
 
     def value(self, table: Table, key: str) -> Any:
-        """Return what a table of `scene` has under a key.
+        """Return the value of a key of a table of `scene`.
 
-        An array (N,) if that varies, or is a default that follows from what varies; of a point or
-        vector one for each coordinate that does.
+        An array (N,) if it varies, or is a default that follows from varied keys; for a point or
+        vector one for each varied coordinate.
         """
         scene, own = self.scene, self._own.get((id(table), key))
 

@@ -179,7 +179,7 @@ LARGEST: Final = 1e6
 """Bound on every dimensional quantity, SI: far beyond any chute, far from overflow in v⁴."""
 
 SHORTEST: Final = 1e-9
-"""m; a few atoms. Less than that has no surface, and releases on a belt are told apart by no less.
+"""m; a few atoms. Nothing smaller has a surface, and releases on a belt are at least so far apart.
 
 This and the following are far from underflow in squares and products, too."""
 

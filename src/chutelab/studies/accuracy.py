@@ -1,10 +1,10 @@
 """`reach`: run a scene until it is accurate enough, and say how that is known.
 
-An accuracy is a relative error or a length, `Wanted`. An engine's word on its own error is not
+An accuracy is a relative error or a length, `Wanted`. An engine's own error estimate is no
 evidence: two runs of one engine may agree on a wrong answer. So a run is compared with a *witness*:
-the theory where it speaks of the whole run, else another engine, which shares no formula with the
-first (see `chutelab.checks.agreement`). Of a crowd that meets, only totals are compared with those
-of another engine. Without a witness nothing is promised.
+the theory if it covers the whole run, else another engine, which shares no formula with the first
+(see `chutelab.checks.agreement`). For a crowd that meets, only totals are compared with another
+engine. Without a witness nothing is promised.
 """
 
 from __future__ import annotations
@@ -70,14 +70,14 @@ def parse(text: str) -> Wanted:
     Raises
     ------
     InputError
-        If it is none that can be asked for.
+        If it cannot be asked for.
 
     Examples
     --------
     >>> parse("1e-6"), parse("1mm")
     (Wanted(size=1e-06, unit='relative'), Wanted(size=0.001, unit='m'))
     """
-    # An InputError is a ValueError, as those of `read_size` are.
+    # An InputError is a ValueError, like those of `read_size`.
     with suppress(ValueError):
         size, unit = read_size(text)
         if unit in ("", "%", "m"):
@@ -89,7 +89,7 @@ def parse(text: str) -> Wanted:
 class Answer:
     """One answer of a run: its name, what kind of quantity it is, and its values.
 
-    Values are (N,) or (N, 2), one a particle or one for all, SI; NaN where it did not happen.
+    Values are (N,) or (N, 2), one per particle or one for all, SI; NaN if it did not happen.
     """
 
     name: str
@@ -98,7 +98,7 @@ class Answer:
 
 
 def each(recording: Recording) -> Iterator[Answer]:
-    """Yield what happens to each particle, and the ledger."""
+    """Yield the events of each particle, and the ledger."""
     for event in NEEDED:
         for surface in recording.surfaces[:-1]:
             found = first(recording, event, surface)
@@ -112,8 +112,7 @@ def each(recording: Recording) -> Iterator[Answer]:
                 pushed = np.stack([found["normal_impulse"], found["tangential_impulse"]], axis=1)
                 what = f"impulse per mass of the {where}"
                 yield Answer(what, "speed", pushed / np.asarray(recording.particle.mass)[..., None])
-    # Others than those at rest, or at the end of a run of given length, end where they do because a
-    # run has to stop somewhere.
+    # Ends count only at rest, or at the end of a run of given length; others are arbitrary.
     segments = recording.machine.segments
     still = segments.surface[segments.speed == 0.0]
     settled = recording.select(Kind.SETTLE)
@@ -134,7 +133,7 @@ def _booked(recording: Recording) -> Iterator[Answer]:
 
 
 def together(recording: Recording) -> Iterator[Answer]:
-    """Yield what can be said of a crowd as a whole."""
+    """Yield the quantities of a crowd as a whole."""
     landed = recording.first(recording.select(Kind.LANDING))
     if len(landed):
         yield Answer("mean landing point", "place", landed["position"][:, :1].mean(axis=0))
@@ -145,10 +144,11 @@ def together(recording: Recording) -> Iterator[Answer]:
 
 
 def sizes(recording: Recording) -> dict[str, float]:
-    """Return what each kind of answer is measured by: as in `results.quantities`, where it can be.
+    """Return the scale of each kind of answer, if possible as in `results.quantities`.
 
-    Otherwise by the extent of the way, its duration and the highest speed; energies always by the
-    energy that was turned over. Of what hardly moves, by its radius, and by its weight times that.
+    Otherwise the scales are the extent of the path, its duration and the highest speed; for
+    energies always the energy turned over. For particles that hardly move they are the radius, and
+    the weight times it.
     """
     known, knots = scales(recording.scene, prediction(recording)), recording.knots
     own = {"length": 0.0, "time": 0.0, "speed": 0.0}
@@ -167,10 +167,10 @@ def sizes(recording: Recording) -> dict[str, float]:
 def apart(
     one: Sequence[Answer], other: Sequence[Answer], measured: dict[str, float], unit: str
 ) -> tuple[float, str]:
-    """Return how far the answers of two runs are apart at most, and which answer that is.
+    """Return the largest difference between answers of two runs, and which answer it is.
 
-    In the unit "m" places only count, m. Else differences are relative to `measured`, from `sizes`,
-    or to the value where that is larger. inf if not the same things happen in both.
+    In the unit "m" only places count, m. Otherwise differences are relative to `measured`, from
+    `sizes`, or to the value if it is larger. inf if the events differ.
     """
     if [a.name for a in one] != [a.name for a in other]:
         return inf, "what happens at all"
@@ -198,21 +198,21 @@ def apart(
 
 
 def distance(one: Recording, other: Recording, unit: str = "relative") -> tuple[float, str]:
-    """Return what `apart` does, of `each` answer of two runs."""
+    """Return `apart` for `each` answer of two runs."""
     return apart(list(each(one)), list(each(other)), sizes(other), unit)
 
 
 def whole_distance(one: Recording, other: Recording) -> tuple[float, str]:
-    """Return what `apart` does, of what two runs are `together`: where they end, and the ledger."""
+    """Return `apart` for two runs `together`: ends and ledger."""
     return apart(list(together(one)), list(together(other)), sizes(other), "relative")
 
 
 class LateError(RuntimeError):
-    """An answer takes longer than it may."""
+    """An answer takes longer than allowed."""
 
 
 UNABLE = (SceneError, StalledError, reference.UnableError, LateError)
-"""What `answer` raises of an engine, or of SciPy, that cannot run a scene, or not in time."""
+"""Errors of `answer` if an engine, or SciPy, cannot run a scene, or not in time."""
 
 
 def answer(
@@ -224,7 +224,7 @@ def answer(
 ) -> Recording:
     """Run a scene with an engine, or with "dop853"; one of `UNABLE` if it cannot.
 
-    An answer that takes more than `max_seconds` of wall time is none.
+    After `max_seconds` of wall time it is given up.
     """
     begin = perf_counter()
 
@@ -249,27 +249,27 @@ WITNESSES = {
     "contact": ("exact", "dop853", "pymunk"),
     "pymunk": ("exact", "dop853", "contact"),
 }
-"""What a run is compared with, the most exact first; engines that cannot run it are skipped."""
+"""Witnesses, the most exact first; engines that cannot run the scene are skipped."""
 
 STEPPED = ("contact", "pymunk")
 """Engines whose error depends on run.dt."""
 
 FLOOR = 1e-14
-"""Relative; two answers nearer than this agree by luck: each went through some tens of roundings of
-1e-16, the closed form of a slip round the pulley through a quadrature."""
+"""Relative; a smaller difference is chance: each answer has tens of roundings of 1e-16, the closed
+form of slip round the pulley also a quadrature."""
 
 STIR = 1e-9
-"""Share by which inputs are changed to see what that does to a crowd."""
+"""Share by which inputs are changed to see the effect on a crowd."""
 
 SHORTEST = 1e-7
 """s; the shortest step a scene may have."""
 
 MOST_STEPS = 50_000
-"""Steps of one run; those before it take as many together."""
+"""Most steps of one run; all earlier ones together take as many."""
 
 STALE, PATIENCE = 0.9, 3
-"""A halved step helps only where the error falls below this share of the least before; after so
-many that do not help, the search ends."""
+"""A halved step helps only if the error falls below this share of the least so far; after so many
+steps without help the search ends."""
 
 
 @dataclass(frozen=True)
@@ -279,12 +279,12 @@ class Accuracy:
     # as in `Wanted`
     asked: float
     unit: str
-    # largest difference from the witness, in the same unit; None if there is none to tell
+    # largest difference from the witness, in the same unit; None if it is not known
     reached: float | None
-    method: str  # how it is known; begins with "none" if it is not
+    method: str  # how it was found; begins with "none" if it was not
     met: bool  # whether `reached` is at most `asked`
-    worst: str  # which answer is the least accurate
-    # whether it speaks of the crowd as a whole only, not of the ways of its particles
+    worst: str  # the least accurate answer
+    # whether it is about the crowd as a whole only, not about single particles
     chaotic: bool
     dt: float | None  # run.dt of the run, s; None for the exact engine
     runs: int  # how many runs it took
@@ -292,7 +292,7 @@ class Accuracy:
 
     @property
     def size(self) -> float:
-        """What was reached; inf if there is none to tell."""
+        """The error reached; inf if it is not known."""
         return inf if self.reached is None else self.reached
 
 
@@ -301,7 +301,7 @@ def reach(
 ) -> tuple[Recording, Accuracy]:
     """Run a scene until it is accurate enough, or cannot be made so.
 
-    The scene's ``run.engine`` is kept to; ``run.dt`` is the longest step that is tried.
+    The scene's ``run.engine`` is used; ``run.dt`` is the longest step that is tried.
 
     Parameters
     ----------
@@ -327,8 +327,8 @@ def reach(
 
     Notes
     -----
-    What is reached is the difference between two independent answers. Where the witness is stepped
-    too, it holds the errors of both.
+    The error reached is the difference between two independent answers. If the witness is stepped,
+    too, it contains the errors of both.
     """
     if not isinstance(wanted, Wanted):
         wanted = parse(wanted if isinstance(wanted, str) else repr(float(wanted)))
@@ -344,7 +344,7 @@ class Search:
         self.witnesses: dict[str, tuple[Recording | None, str]] = {}
 
     def result(self) -> tuple[Recording, Accuracy]:
-        """Return what `reach` does: halve the steps until run and witness are near enough."""
+        """Return the result of `reach`: halve steps until run and witness are near enough."""
         found, dt, stale = self.run(self.scene), self.scene.run.dt, 0
         best: tuple[Recording, Accuracy] | None = None
         while True:
@@ -378,7 +378,7 @@ class Search:
                 self.witnesses[found.engine] = self.run(finer, other.engine), ""
 
     def judged(self, found: Recording) -> Accuracy:
-        """Say how wrong a run is, one of the scene with any engine and step.
+        """Return the error of a run of the scene with any engine and step.
 
         A witness runs once for each engine, with the step of `scene`.
         """
@@ -404,7 +404,7 @@ class Search:
         """Run a scene once more."""
 
         def share(share: float) -> None:
-            # Half of what is left goes to each run: how many there will be is not known.
+            # Each run gets half of the remaining progress, since their number is not known.
             if self.progress is not None:
                 self.progress(1.0 - 0.5**self.runs * (1.0 - 0.5 * share))
 
@@ -431,7 +431,7 @@ class Search:
         )
 
     def by_theory(self, found: Recording) -> Accuracy | None:
-        """Hold a run against the closed form; None where that does not speak of all of it."""
+        """Compare a run with the closed form; None if that does not cover all of it."""
         compared = compare(found)
         if compared.reason or found.count > 1 or self.scene.run.until != "landed":
             return None
@@ -465,8 +465,8 @@ class Search:
     def crowd(self, found: Recording) -> Accuracy:
         """Compare the totals of a crowd with another engine's, and with runs of changed inputs.
 
-        A change of the inputs too small to notice moves every particle's way after a few
-        collisions, and so, less, the mean: differences smaller than that would be luck.
+        A tiny change of the inputs changes every particle's path after a few collisions and so,
+        less, the mean. Smaller differences than that are chance.
         """
         engine = "pymunk" if found.engine == "contact" else "contact"
         scene = found.scene
@@ -488,9 +488,9 @@ class Search:
 def stirred(scene: Scene, share: float) -> Scene:
     """Return a scene with gravity and speeds lower by a share, a tiny one.
 
-    Lower, because many keys have an upper bound and none of these a lower one but 0. The belt and
-    what is released on it keep the same speed. What is released from rest takes the same path with
-    less gravity, only later, so it is moved aside by that share of its radius.
+    Lower, because many keys have an upper bound, but these no lower one except 0. The belt and
+    particles released on it keep equal speeds. A particle released from rest would take the same
+    path with less gravity, only later, so it is moved aside by that share of its radius.
     """
     less = 1.0 - share
     values: dict[str, object] = {"gravity": scene.gravity * less, "expect": None}

@@ -1,4 +1,4 @@
-"""From a scene to a design: what to change so that a quantity becomes what it should be.
+"""From a scene to a design: find the changes that give a quantity a wanted value.
 
 >>> import chutelab
 >>> from chutelab import design
@@ -7,14 +7,14 @@
 >>> round(found.answer.values[0], 3)
 47.829
 
-`solve`, `minimize` and `maximize` go from a question in words to a `Solution`. One key is solved
-piece by piece; several keys by a global search with a seed, and a polish.
+`solve`, `minimize` and `maximize` turn a question in words into a `Solution`. One key is solved
+piece by piece; several keys by a global search with a seed, followed by a local one.
 
-- `evaluation`: what can be aimed at and varied, the one place where variants are run, and slopes.
+- `evaluation`: possible targets and keys; runs all variants; slopes.
 - `roots`: one key: smooth pieces, all roots, all minima.
 - `searches`: several keys; streams, whose numbers differ from seed to seed.
 - `answers`: a `Solution`, in numbers and in words.
-- `uncertainty`: how uncertain inputs spread, and which of them matters: an `Uncertainty`.
+- `uncertainty`: the effect of uncertain inputs, and which of them matters: an `Uncertainty`.
 """
 
 from __future__ import annotations
@@ -71,16 +71,16 @@ REPEAT: Final = 8
 """Seeds of a search among streams whose particles meet."""
 
 NOISY_POINTS: Final = 96
-"""Variants of such a search, at most."""
+"""Most variants of such a search."""
 
 POINTS: Final = 181
-"""Of the scan over one key: a quarter of a second, and half a degree of a plate's angles."""
+"""Points of the scan over one key: a quarter of a second, and half a degree of plate angle."""
 
 FEWEST: Final = 3
 MOST: Final = 100_001
 
 MORE: Final = 400
-"""Variants beyond the scan that a search over one key runs, about; for the progress."""
+"""About how many variants a search over one key runs after the scan; for the progress."""
 
 
 class How(TypedDict, total=False):
@@ -94,16 +94,16 @@ class How(TypedDict, total=False):
         Seeds that each variant is run with; default: `REPEAT` where particles meet, else 1. With
         several, quantities are means, and the answer has its error.
     deviations : float
-        What is least or largest is the mean, worsened by so many standard deviations of one run.
+        The mean is minimised or maximised, made worse by so many standard deviations of one run.
     points : int
-        With one key and one seed: how many values are looked at first, `POINTS`. Two solutions
-        between neighbours are found only if the quantity bends visibly between them. With several
-        seeds: variants at most, `NOISY_POINTS`.
+        With one key and one seed: number of values of the scan, `POINTS`. Two solutions between
+        neighbouring values are found only if the quantity bends visibly between them. With several
+        seeds: most variants, `NOISY_POINTS`.
     seed : int
-        Of the draws of the search, with several keys or seeds.
+        Seed of the draws of the search, with several keys or seeds.
     jobs, team : int, Crew
-        Processes to spread the runs over, 0 is one for each processor; or what
-        `chutelab.studies.sweep.crew` gives.
+        Processes to spread the runs over, 0 is one for each processor; or a
+        `chutelab.studies.sweep.crew`.
     max_seconds : float
         After this time the search ends with what is known.
     progress : callable
@@ -130,7 +130,7 @@ def solve(
     maximize: str | None = None,
     **how: Unpack[How],
 ) -> Solution:
-    """Find the values of some keys for which a quantity is what it should be.
+    """Find the values of some keys for which a quantity has a wanted value.
 
     Parameters
     ----------
@@ -150,7 +150,8 @@ def solve(
     Returns
     -------
     Solution
-        All solutions, with one key and one seed. Else one, with several seeds with its error.
+        With one key and one seed all solutions; otherwise one, with its error if there are several
+        seeds.
 
     Raises
     ------
@@ -159,7 +160,7 @@ def solve(
     SceneError
         If the scene itself cannot be run.
     ImportError
-        Without SciPy; of several seeds without scikit-learn.
+        Without SciPy; with several seeds also without scikit-learn.
     KeyboardInterrupt
         With the `Solution` that is known so far as its ``solution``, if any variant has run.
 
@@ -210,7 +211,7 @@ SHARP: Final = 1e-4
 """Share of a range below which the error of an answer at its end is that of the search alone."""
 
 ELSEWHERE: Final = 0.5
-"""Share of likely answers that are elsewhere from which on that is told."""
+"""If a larger share of the likely answers is elsewhere, this is reported."""
 
 
 def _limits(
@@ -218,7 +219,7 @@ def _limits(
     given: Mapping[str, tuple[float | str | None, float | str | None]],
     quantities: list[Quantity],
 ) -> tuple[tuple[tuple[int, float], ...], list[str]]:
-    """Read limits: where each is among the quantities, which gain them, and in words."""
+    """Read limits: index of each among the quantities (extended by them), and words."""
     found: list[tuple[int, float]] = []
     said = []
     for name, ends in given.items():
@@ -241,7 +242,7 @@ def _limits(
 
 
 class _Search:
-    """One question: everything that can be refused is looked at before anything runs."""
+    """One question; everything that can be refused is checked before anything runs."""
 
     def __init__(
         self,
@@ -298,7 +299,7 @@ class _Search:
 
     @property
     def shown(self) -> list[int]:
-        """Which quantities are told: of targets the left sides."""
+        """Indices of the quantities shown: of targets the left sides."""
         rest = range(2 * self.targets, len(self.evaluate.quantities))
         return [*range(0, 2 * self.targets, 2), *rest]
 
@@ -325,7 +326,7 @@ class _Search:
                 raise
 
     def known(self, why: str) -> Solution:
-        """Return the best of what a search has seen that did not come to its end."""
+        """Return the best result of a search that was ended early."""
         if not self.evaluate.seen:
             return self.solution([], [f"Not finished: {why}; no variant has run."], finished=False)
         points, values = (np.concatenate(part) for part in zip(*self.evaluate.seen, strict=True))
@@ -340,7 +341,7 @@ class _Search:
         return self.solution([], [note], nearest=near, finished=False)
 
     def told(self, values: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return what an answer has of the quantities, (M,): those that are told, and what for."""
+        """Return an answer's quantities from (M,): those shown, and the wanted values."""
         numbers = values.tolist()
         return (
             tuple(numbers[n] for n in self.shown),
@@ -385,7 +386,7 @@ class _Search:
         return solution
 
     def rounded(self, found: Found) -> Answer:
-        """Return an answer whose numbers have the digits that their errors leave."""
+        """Return an answer with its numbers rounded to their errors."""
         numbers = [
             (float(rounded(value, error)), error)
             for value, error in (
@@ -399,7 +400,7 @@ class _Search:
             end = one.low if value - one.low < one.high - value else one.high
             at_end |= abs(value - end) <= error
             if abs(value - end) <= error < SHARP * one.width:
-                # Where no seed has it elsewhere, the end is no estimate and has no error.
+                # If no seed has the answer elsewhere, the end of the range has no error.
                 numbers[n] = end, 0.0
             else:
                 numbers[n] = min(max(value, one.low), one.high), error
@@ -491,12 +492,12 @@ class _Search:
         return self.solution([replace(answers[0], place="inside")], [note], scan=seen)
 
     def place(self, at: Floats) -> str:
-        """Tell whether a point (K,) is at an "end" of a range."""
+        """Return whether a point (K,) is "inside" or at an "end" of a range."""
         low, high = np.array([(one.low, one.high) for one in self.ranges]).T
         return "end" if np.any(np.minimum(at - low, high - at) <= 1e-9 * (high - low)) else "inside"
 
     def answer(self, at: ArrayLike, place: str = "inside", *, slopes: bool = True) -> Answer:
-        """Return what is found at a point (K,)."""
+        """Return the answer at a point (K,)."""
         point = np.asarray(at, dtype=np.float64)
         outcome = self.evaluate(point[np.newaxis])
         return Answer(
@@ -514,7 +515,7 @@ class _Search:
         scan: Scan | None = None,
         **found: Any,
     ) -> Solution:
-        """Return the result, with what holds for all questions."""
+        """Return the solution, with the parts common to all questions."""
         quantities = self.evaluate.quantities
         said = []
         if any(quantity.ending == "settled" for quantity in quantities):

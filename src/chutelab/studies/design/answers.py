@@ -1,7 +1,6 @@
-"""What `solve`, `minimize` and `maximize` answer: `Solution`, as numbers and in words.
+"""The result of `solve`, `minimize` and `maximize`: `Solution`, as numbers and in words.
 
-The words say how many answers there are, where they stop, what is a jump, and what one per cent
-does.
+The words give the number of answers, the ends of solutions, jumps, and the effect of one per cent.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, frame, plain, plus_minus
 
 DIGITS: Final = 10
-"""Significant digits in which an answer is shown; it has more."""
+"""Significant digits shown of an answer, which has more."""
 
 
 Goal = Literal["solve", "minimize", "maximize"]
@@ -38,8 +37,8 @@ class Answer:
     values : tuple of float
         Of the varied keys, in their order.
     found : tuple of float
-        The quantities asked for: the left sides of the targets, what is least or largest, and what
-        is limited.
+        The quantities asked for: the left sides of the targets, the one that is least or largest,
+        and the limited ones.
     wanted : tuple of float
         The right sides of the targets; empty without targets.
     course : str
@@ -47,9 +46,9 @@ class Answer:
     place : str
         "inside" the range, at an "end" of it, or at a "change" of the course.
     sensitivities : tuple of Sensitivity
-        What each key does to each quantity here; empty for further answers of no interest.
+        The effect of each key on each quantity here; empty for minor answers.
     errors, found_errors : tuple of float
-        Of several seeds, the standard errors of `values` and `found`; else empty.
+        With several seeds, the standard errors of `values` and `found`; else empty.
     """
 
     values: tuple[float, ...]
@@ -67,7 +66,7 @@ class Answer:
         return tuple(f - w for f, w in zip(self.found, self.wanted, strict=False))
 
     def told(self, quantity: str, value: float) -> float:
-        """Return a quantity as tables have it: 0 if it is rounding, by what it is 1 % away."""
+        """Return a quantity for tables: 0 if it is rounding, judged by its value 1 % away."""
         near = [s for s in self.sensitivities if s.quantity == quantity]
         sizes = [abs(side) for s in near for side in (s.lower, s.upper) if isfinite(side)]
         return 0.0 if sizes and abs(value) <= ROUNDING * max(sizes) else value
@@ -75,7 +74,7 @@ class Answer:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(Shown):
-    """What a search over one key or several found.
+    """Result of a search over one or several keys.
 
     Attributes
     ----------
@@ -84,29 +83,30 @@ class Solution(Shown):
     ranges : tuple of Span
         The varied keys.
     quantities, units : tuple of str
-        What the numbers of an answer are.
+        The quantities of an answer, and their units.
     answers : tuple of Answer
         All solutions in order of the key, or all minima, the least first; empty if there is none.
     runs, seed : int
-        How many variants were run, each seed counted; of the search over several keys.
+        Number of variants that were run, each seed counted; seed of the search over several keys.
     variants : ndarray, (N, K), and outcomes : ndarray, (N, S, M), or None
-        Of several seeds, the variants that were run, and all quantities of each seed.
+        With several seeds, the variants that were run, and all quantities of each seed.
     finished : bool
-        Whether the search came to its end: else it was interrupted, or its time was up.
+        Whether the search was completed; otherwise it was interrupted, or its time was up.
     notes : tuple of str
-        What else to know.
+        Further remarks.
     base : Scene
-        What was varied.
+        The scene that was varied.
     scan : Scan or None
-        What was looked at on the way, with one key.
+        With one key, the values that were tried.
     nearest : Answer or None
-        Without a solution, where the targets are missed by least.
+        Without a solution, the point that misses the targets by least.
     everywhere : tuple of (float, float)
         Ranges of the key in which every value is a solution.
     jumps : tuple of Change
-        Where the target is jumped over, which is no solution.
+        Jumps of the quantity over the target, which are not solutions.
     best : int
-        Which answer `scene` is at: of several solutions, the one nearest to the scene's own value.
+        Index of the answer of `scene`: of several solutions the one nearest to the scene's own
+        value.
     """
 
     asked: str
@@ -145,7 +145,7 @@ class Solution(Shown):
         Raises
         ------
         ValueError
-            If there is not even that: no variant has the quantity.
+            If there is none, because no variant has the quantity.
         """
         if self.answers:
             return self.answers[self.best]
@@ -169,7 +169,7 @@ class Solution(Shown):
         return simulate(self.scene)
 
     def frame(self) -> Any:
-        """Return what was looked at with one key as a pandas DataFrame.
+        """Return the values tried with one key as a pandas DataFrame.
 
         Raises
         ------
@@ -185,7 +185,7 @@ class Solution(Shown):
         return frame(dict(zip(names, (self.scan.x, *values.T), strict=True)))
 
     def sheet(self) -> Sheet:
-        """Return the answers in a table, with what to know of them."""
+        """Return the answers in a table, with remarks."""
         keys = [with_unit(one.key, one.unit) for one in self.ranges]
         names = [with_unit(*one) for one in zip(self.quantities, self.units, strict=True)]
         rows = []
@@ -213,7 +213,7 @@ class Solution(Shown):
         return Sheet(self.asked, columns, tuple(rows), notes=tuple(remarks(self)))
 
     def slopes(self) -> Sheet:
-        """Return what each key does to each quantity at the answer, and what 1 % of it does."""
+        """Return the slope of each quantity by each key at the answer, and the effect of 1 %."""
         rows = []
         for s in self.answer.sensitivities if self.solved else ():
             unit = symbol(s.unit)
@@ -276,14 +276,14 @@ def as_dict(solution: Solution) -> dict[str, Any]:
 
 
 MOST: Final = 6
-"""Changes of one kind that are spelled out."""
+"""Most changes of one kind that are listed."""
 
 ROUNDING: Final = 1e-9
-"""Relative change over one per cent of a key that is none: a minimum is found to half of the
-digits, and the slope there is what that leaves; a root of 0 has its rounding left."""
+"""A smaller relative change over one per cent of a key counts as none: a minimum is found only to
+half of the digits, so its slope is not quite 0, nor is a root of 0."""
 
 KINK: Final = 1e-4
-"""Relative change of a quantity across a change of course that is no jump."""
+"""A smaller relative change of a quantity across a change of course is not a jump."""
 
 
 def remarks(solution: Solution) -> Iterator[str]:

@@ -1,12 +1,12 @@
-"""The question: what can be aimed at, what can be varied; and the one place where variants are run.
+"""The question: possible targets and keys; and the one place where variants are run.
 
 >>> from chutelab.scene import load
 >>> left, right = target(load("perpendicular"), "landing.vx", "outgoing.speed")
 >>> left.unit, right.name
 ('m/s', 'outgoing.speed')
 
-Also here: the course of a particle, which surfaces it touches up to its landing, and how much a
-quantity depends on each key: its slope, and what one per cent of the key does.
+Also here: the course of a particle (the surfaces that it touches up to its landing), and the
+sensitivity of a quantity to each key: its slope, and the effect of one per cent.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ T = TypeVar("T")
 def each_once(
     option: str, given: Sequence[Any], read: Callable[[Any], T], ask: str, most: int
 ) -> tuple[T, ...]:
-    """Read what an option takes, 1 to `most` times, as `typed`; each result has another `key`."""
+    """Read the values of an option given 1 to `most` times; each result has its own `key`."""
     if not given:
         raise InputError(ask, option)
     if len(given) > most:
@@ -68,16 +68,16 @@ def each_once(
 
 
 def scipy(name: str) -> Any:
-    """Return a module of SciPy, such as ``optimize``; without SciPy say what to install."""
+    """Return a module of SciPy, such as ``optimize``; the error says what to install."""
     return library(f"scipy.{name}", "SciPy is needed", "design")
 
 
 MANY_TOUCHES: Final = 6
-"""Touches of one surface in a row from which on they are not counted: a particle that bounces to
-rest does so a thousand times, and extra bounces do not change the sequence of contacts."""
+"""Touches of one surface in a row beyond this number are ignored: a particle that bounces to rest
+has a thousand, and extra bounces do not change the sequence of contacts."""
 
 LONGEST: Final = 6
-"""Surfaces that are named; longer sequences are cut off there."""
+"""Most surfaces that are named; longer sequences are cut off."""
 
 
 def courses_of(recording: Recording) -> list[str]:
@@ -122,14 +122,14 @@ class Quantity:
 
     name: str  # as it was asked for
     unit: str
-    # of a run: its name, see `chutelab.scene.quantities`. Of the scene: the full path.
+    # for a run: its name, see `chutelab.scene.quantities`. For the scene: the full path.
     key: str = ""
     source: Literal["run", "scene", "number"] = "run"
     ending: Ending = "any"
     number: float = 0.0
 
     def of(self, recording: Recording) -> Any:
-        """Return its value, of each scene of a family (N,); NaN where it did not happen."""
+        """Return its value, for a family (N,); NaN if it did not happen."""
         value: Any = self.number
         if self.source == "scene":
             family = recording.family if is_plain(self.key) else None
@@ -142,7 +142,7 @@ class Quantity:
 
 
 def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
-    """Return the quantity of a scene that has this name; messages call it `typed`.
+    """Return the quantity of a scene by name; messages call it `typed`.
 
     Raises an `InputError` if the scene has no such quantity.
     """
@@ -158,7 +158,7 @@ def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
 def target(
     scene: Scene, name: str, value: float | str, typed: str = ""
 ) -> tuple[Quantity, Quantity]:
-    """Return a quantity, and the number, key of the scene or quantity that it is to equal.
+    """Return a quantity, and the number, key or quantity that it should equal.
 
     Raises an `InputError` if one of them is unknown, or their units differ.
     """
@@ -202,10 +202,10 @@ def _in(unit: str) -> str:
 ASK: Final = "say what may vary, and between which ends, such as plate.angle_deg from 0 to 80"
 
 MOST: Final = 8
-"""Keys that may vary at once: beyond, a search over the whole range takes too long to be one."""
+"""Most keys that may vary at once; with more, a search over the whole range takes too long."""
 
 INSIDE: Final = 0.3819660112501051
-"""Share of a range at which the key is tried before the search; no whole number comes of it."""
+"""Share of a range at which a key is tried before the search; it gives no whole number."""
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ class Span:
 
 
 def ranges(scene: Scene, vary: Varied) -> tuple[Span, ...]:
-    """Return the ranges of keys that vary; each is tried on the scene."""
+    """Return the ranges of varied keys; each is tried on the scene."""
 
     def read(given: Vary) -> Span:
         home = given.key.partition(".")[0]
@@ -242,7 +242,7 @@ def ranges(scene: Scene, vary: Varied) -> tuple[Span, ...]:
                 scene.with_values({about.path: tried})
             except SceneError as error:
                 refused.append(error)
-                # What only does not go with other keys may pass.
+                # A value that only contradicts other keys is accepted here.
                 if own := [fault for fault in error.faults if fault.key == about.path]:
                     raise InputError(str(own[0]), given.typed) from None
         if len(refused) == 3:
@@ -255,34 +255,34 @@ def ranges(scene: Scene, vary: Varied) -> tuple[Span, ...]:
 
 
 FEWEST: Final = 8
-"""Variants from which on it pays to run them at once."""
+"""With at least so many variants it pays to run them at once."""
 
 BLOCK: Final = 4096
-"""Variants at once: what they need then is some tens of megabytes, and the progress moves."""
+"""Variants run at once: they need some tens of megabytes, and progress is reported between."""
 
 NO_RUN: Final = "no run"
-"""The course of a variant that makes no scene, or cannot be run."""
+"""The course of a variant that is not a valid scene, or cannot be run."""
 
 
 class Outcomes(NamedTuple):
-    """What became of N variants."""
+    """Results of N variants."""
 
-    values: Floats  # the M quantities of each, (N, M); NaN where they did not happen
+    values: Floats  # the M quantities of each, (N, M); NaN if they did not happen
     # surfaces touched by particle 0, such as ``plate, outgoing``; `NO_RUN` without a run
     courses: list[str]
-    faults: list[str]  # why there was no run; "" where there was one
+    faults: list[str]  # why there was no run; "" if there was one
     # kind of each outcome, see `chutelab.studies.sweep.rows.touches`; `NO_RUN` without a run
     touches: list[str]
 
 
 class Stopped(Exception):  # noqa: N818 - no fault: time is up
-    """A search ends before its end; what it has seen is in `Evaluator.seen`."""
+    """A search was ended early; its results so far are in `Evaluator.seen`."""
 
 
 class Task(NamedTuple):
     """Variants to be run in one go; can be sent to another process."""
 
-    rows: slice  # which of the points they are
+    rows: slice  # indices of the points
     block: Block
     quantities: Sequence[Quantity]
     apart: bool
@@ -326,10 +326,11 @@ class Evaluator:
         table = np.asarray(points, dtype=np.float64)
         values = np.full((len(table), len(self.quantities)), np.nan)
         courses, faults, kinds = np.full((3, len(table)), "", dtype=object)
-        # The run that ends as the scene says comes last: of what both know, its values stay.
+        # The run that ends as the scene says comes last, so its values are kept where both have
+        # them.
         wanted = {quantity.ending for quantity in self.quantities} - {"any"}
         endings = sorted(wanted, reverse=True) or ["scene"]
-        # A family does not tell these of each.
+        # A family does not have these for each variant.
         together = ("contacts", "sensor", "wear")
         apart = len(table) < FEWEST
         apart |= any(one.key.split(".")[0] in together for one in self.quantities)
@@ -353,14 +354,14 @@ class Evaluator:
 
     @property
     def size(self) -> int:
-        """Variants of a task: one where each may take long and others could do it meanwhile."""
+        """Variants per task: one if each may take long and there are other processes."""
         together = are_family(self.scene, self.keys, None)
         return max(1, BLOCK // self.scene.count) if together or self.scene.count == 1 else 1
 
     def seeds(self, points: Floats, count: int) -> Floats:
         """Run variants at points (N, K) with `count` seeds, the same for all; values (N, S, M).
 
-        If time is up or Ctrl-C is pressed, `stopped` has that, and `ran`, (N,), which were done.
+        If time is up or Ctrl-C is pressed, `stopped` is set, and `ran`, (N,), marks finished ones.
         """
         wanted = {quantity.ending for quantity in self.quantities} - {"any"}
         scene = self.scene.with_values(_until("settled" if "settled" in wanted else "scene"))
@@ -385,7 +386,7 @@ class Evaluator:
         return values
 
     def results(self, tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
-        """Yield the number of each task and what came of it; raises a `Stopped` if time is up."""
+        """Yield the number and result of each task; raises a `Stopped` if time is up."""
         variants = sum(len(task.block.values) for task in tasks)
         with closing(self.team.results(carried_out, enumerate(tasks))) as results:
             for done, found in enumerate(results, 1):
@@ -424,32 +425,32 @@ def value(scene: AnyScene, name: str) -> float:
 
 
 STEPS: Final = (1e-3, 1e-4, 1e-5, 1e-6)
-"""Of a range: over the largest, differences lose fewest digits to rounding, over the smallest they
-see least of what bends the function."""
+"""Steps as shares of a range: with the largest, differences lose the fewest digits to rounding;
+with the smallest they are least affected by curvature."""
 
 PERCENT: Final = 0.01
 
 ROUNDING: Final = 1e-15
-"""Relative error of a quantity: what a difference over a step must stay clear of."""
+"""Relative error of a quantity; a difference over a step must be well above it."""
 
 STEADY: Final = 0.01
-"""By how much a one-sided slope may change when its step is halved."""
+"""Largest relative change of a one-sided slope when its step is halved."""
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What a key does to a quantity at a point."""
+    """The effect of a key on a quantity at a point."""
 
-    # what is changed, and its unit
+    # the key and its unit
     key: str
     unit: str
-    # what changes
+    # the quantity and its unit
     quantity: str
     quantity_unit: str
-    # in quantity_unit per unit; NaN where the course changes within a millionth of the range
+    # in quantity_unit per unit; NaN if the course changes within a millionth of the range
     derivative: float
     step: float  # one per cent of the key's value; of its range, if its value is 0
-    # the quantity with the key one `step` less and more; NaN where it has none
+    # the quantity with the key one `step` less and more; NaN without a value
     lower: float
     upper: float
     courses: tuple[str, str]  # the way of particle 0 there
@@ -458,7 +459,7 @@ class Sensitivity:
 def sensitivities(
     evaluate: Evaluator, ranges: Sequence[Span], at: Floats, columns: Sequence[int]
 ) -> tuple[Sensitivity, ...]:
-    """Return what each key does to some of the evaluator's quantities at a point, (K,)."""
+    """Return the effect of each key on some quantities at a point, (K,)."""
     found = []
     for one, unit in zip(ranges, np.eye(len(at)), strict=True):
         derivative = _derivatives(evaluate, at, unit * one.width)
@@ -477,10 +478,10 @@ def sensitivities(
 
 
 def _derivatives(evaluate: Evaluator, at: Floats, along: Floats) -> Floats:
-    """Return the derivatives of all quantities by one key; one-sided where the course ends.
+    """Return the derivatives of all quantities by one key; one-sided next to a change of course.
 
-    Differences over a step and half of it are extrapolated; of all steps the one counts at which
-    the two agree best, since next to a jump the function may bend within any step. `along` is the
+    Differences over a step and half of it are extrapolated. Of all steps the one at which the two
+    agree best counts, since next to a jump the function may bend within any step. `along` is the
     range of the key in its own direction, (K,).
     """
     (here,), (course,), *_ = evaluate(at[np.newaxis])
@@ -502,7 +503,7 @@ def _derivatives(evaluate: Evaluator, at: Floats, along: Floats) -> Floats:
         if usable[side].any():
             smallest = np.flatnonzero(usable[side])[-1]
             far, half = (values[side, smallest] - here) / (sign * steps[smallest])
-            # A slope that depends on the step is none: at a grazing blow it is infinite.
+            # A slope that depends on the step does not exist: at a grazing impact it is infinite.
             steady = np.abs(half - far) <= STEADY * np.abs(half)
             slope: Floats = np.where(steady, 2.0 * half - far, np.nan)
             return slope

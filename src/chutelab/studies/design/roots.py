@@ -4,8 +4,8 @@ SciPy finds one root between two values, and one minimum, of a function that exi
 range holds several of them; the function jumps where the particle's course changes, and for some
 values of the key there is none. `brentq` takes a jump for a root: of landing.vx = -0.9 m/s over
 7.97 to 8.5 degrees of the plate of inclined-20 it answers 7.98012, where vx jumps from -1.00 to
--0.84. So `scan` first cuts the range into pieces with one course each, and SciPy works on these:
-between neighbours of different signs, and about points that are lower than their neighbours.
+-0.84. So `scan` first divides the range into pieces with one course each. SciPy works on these:
+between neighbours of different signs, and around points that are lower than their neighbours.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Function = Callable[[float], float]
 
 
 def bounded(function: Function, low: float, high: float, sign: float = 1.0) -> tuple[float, float]:
-    """Return where `sign` times a function is least between two values, and how much that is.
+    """Return the place and value of the minimum of `sign` times a function in an interval.
 
     Near a smooth minimum the place is only known to about the square root of a rounding, because
     the function does not change over it.
@@ -38,15 +38,15 @@ def bounded(function: Function, low: float, high: float, sign: float = 1.0) -> t
 
 
 MOST_CHANGES: Final = 24
-"""Changes of course that are closed in on; a range with more of them is too wide to be understood,
-and what is left stays between two points of the grid."""
+"""Most changes of course that are located; a range with more is too wide to be understood, and the
+others stay between two points of the grid."""
 
 SLIVER: Final = 1e-9
-"""Share of the range below which a piece with another course is left out: a clipped edge, or
-rounding."""
+"""Pieces with another course that are shorter than this share of the range are left out: a clipped
+edge, or rounding."""
 
 ROUNDS: Final = 60
-"""Halvings that bring any interval down to neighbouring numbers, 2⁻⁵³ of its ends, and some."""
+"""Halvings that reduce any interval to neighbouring numbers, 2⁻⁵³ of its ends, and a few more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,13 +55,13 @@ class Change:
 
     low: float
     high: float
-    values: Floats  # the M quantities on both sides, (2, M); NaN where they have no value
+    values: Floats  # the M quantities on both sides, (2, M); NaN without a value
     courses: tuple[str, str]  # the way of particle 0 before and after
     fault: str = ""  # why there is no run on one of the sides, "" if there is
 
     @property
     def at(self) -> float:
-        """The value of the key, either side of which is meant."""
+        """The value of the key at the change."""
         return 0.5 * (self.low + self.high)
 
     @property
@@ -86,7 +86,7 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """The whole range: pieces in order, the changes between them, and whether these are all."""
+    """The whole range: pieces in order, the changes between them, and whether they are complete."""
 
     pieces: tuple[Piece, ...]
     changes: tuple[Change, ...]
@@ -94,7 +94,7 @@ class Scan:
 
     @property
     def x(self) -> Floats:
-        """All values of the key that were looked at, ascending."""
+        """All values of the key that were tried, ascending."""
         return np.concatenate([piece.x for piece in self.pieces])
 
     @property
@@ -104,7 +104,7 @@ class Scan:
 
     @property
     def size(self) -> float:
-        """The largest of the quantities, in size; 0 without any."""
+        """The largest absolute value of the quantities; 0 without any."""
         return float(np.abs(self.values[np.isfinite(self.values)]).max(initial=0.0))
 
 
@@ -116,10 +116,10 @@ class _Point(NamedTuple):
 
 
 def scan(evaluate: Evaluator, low: float, high: float, points: int) -> Scan:
-    """Look at a grid over the range of the evaluator's only key, and close in on changes of course.
+    """Try a grid over the range of the evaluator's only key, and locate changes of course.
 
-    Each round halves the intervals in which the course changes. What is seen on the way is kept: it
-    crowds where the function may be steepest, on both sides of a change.
+    Each round halves the intervals in which the course changes. Values on the way are kept: they
+    cluster where the function may be steepest, on both sides of a change.
     """
     seen: list[_Point] = []
     new, complete = np.linspace(low, high, points).tolist(), True
@@ -147,30 +147,30 @@ def scan(evaluate: Evaluator, low: float, high: float, points: int) -> Scan:
 
 
 CLOSE: Final = 1e-9
-"""What counts as 0, relative to the size of the two sides: far above rounding (1e-15), far below
-any jump worth the name."""
+"""A smaller value, relative to the size of the two sides, counts as 0: far above rounding (1e-15),
+far below any real jump."""
 
 EXACT: Final = 1e-3
-"""Share of that which is 0 at an end of the range, where no change of sign can be closed in on."""
+"""Share of this that counts as 0 at an end of the range, where no change of sign can be located."""
 
 LIMIT: Final = 100.0
-"""The same for the end of a piece, to which a function may come as steeply as a square root does: a
-rounding from it, it still is the root of a rounding away."""
+"""The same for the end of a piece, which a function may approach like a square root: at a distance
+of one rounding it is still off by the root of a rounding."""
 
 SAME: Final = 1e-8
-"""Share of the range within which two roots, or two minima, are one."""
+"""Two roots, or two minima, closer than this share of the range are one."""
 
 
 def roots(
     found: Scan, function: Function
 ) -> tuple[list[float], list[tuple[float, float]], list[Change], float]:
-    """Find where a function is 0: the difference of the two quantities of a scan.
+    """Find the zeros of the difference of the two quantities of a scan.
 
     Returns
     -------
     at, everywhere, jumps, nearest
-        Values of the key where it is 0, ascending; ranges in which it is 0 throughout; where it
-        jumps over 0, which is no solution; and where it is closest to 0, NaN if it has no value.
+        Values of the key where it is 0, ascending; ranges in which it is 0 throughout; jumps over
+        0, which are not solutions; and where it is closest to 0, NaN if it has no value.
     """
     brentq, zero = scipy("optimize").brentq, CLOSE * found.size
     ends, width = (found.x[0], found.x[-1]), float(np.ptp(found.x))
@@ -193,20 +193,20 @@ def roots(
             small = np.full(len(x), zero)
             for border in (0, -1):
                 small[border] *= EXACT if x[border] in ends else LIMIT
-            # What is next to a change of sign is closed in on.
+            # Locate zeros next to a change of sign.
             signs, lone = np.sign(f), np.ones(len(x), dtype=bool)
             crossing = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
             lone[crossing] = lone[crossing + 1] = False
             met = x[(f == 0.0) | (size <= small) & lone].tolist()
             for low, high in zip(x[crossing].tolist(), x[crossing + 1].tolist(), strict=True):
-                # It takes no absolute width of 0, and no relative one below four roundings.
+                # It accepts no absolute tolerance of 0, and no relative one below four roundings.
                 xtol, rtol = np.spacing(max(abs(low), abs(high))), 4.0 * np.finfo(float).eps
                 met.append(brentq(function, low, high, xtol=xtol, rtol=rtol, maxiter=300))
             for root in met:
                 if abs(function(root)) <= zero * (LIMIT if root in (first, last) else 1.0):
                     at.append(root)
                     continue
-                # The bracket closed in on a jump, though the course stays.
+                # The bracket contains a jump, though the course does not change.
                 step = 1e-12 * max(abs(root), last - first)
                 low, high = np.clip([root - step, root + step], first, last).tolist()
                 sides = np.array([[function(low)], [function(high)]])
@@ -214,7 +214,7 @@ def roots(
     distinct: list[float] = []
     for root in sorted(at):
         if distinct and root - distinct[-1] <= SAME * width:
-            # The same root, seen from two sides.
+            # The same root, found from two sides.
             distinct[-1] = min(distinct[-1], root, key=lambda x: abs(function(x)))
         else:
             distinct.append(root)
@@ -225,7 +225,7 @@ def roots(
 def _flat(
     x: Floats, f: Floats, zero: float
 ) -> tuple[list[tuple[float, float]], list[tuple[Floats, Floats]]]:
-    """Split off runs of three points and more at which the function is 0 throughout."""
+    """Split off runs of three or more points at which the function is 0."""
     flat: list[tuple[float, float]] = []
     rest, start = [], 0
     edges = np.flatnonzero(np.diff(np.abs(f) <= zero, prepend=False, append=False))
@@ -241,7 +241,7 @@ def _flat(
 def _turning(x: Floats, f: Floats, function: Function) -> tuple[Floats, Floats]:
     """Add the points between which the function comes closest to 0 without a change of sign.
 
-    It may touch 0 there, or go through it and back.
+    It may touch 0 there, or cross it twice.
     """
     points = dict(zip(x.tolist(), f.tolist(), strict=True))
     for i in range(len(x)):
@@ -256,19 +256,19 @@ def _turning(x: Floats, f: Floats, function: Function) -> tuple[Floats, Floats]:
 
 
 Place = Literal["inside", "end", "change"]
-"""A minimum with a slope of 0 or a kink; one at an end of the range, where the function still
-falls; one where the course changes."""
+"""Kind of a minimum: with a slope of 0 or a kink; at an end of the range, where the function still
+falls; or at a change of course."""
 
 APART: Final = 1e-6
-"""Share of the range within which points are not compared: next to a change of course they crowd,
-and differ by nothing but rounding."""
+"""Points closer than this share of the range are not compared: next to a change of course they
+cluster, and differ only by rounding."""
 
 EVEN: Final = 1e-12
-"""Relative change over the whole range that is none."""
+"""A smaller relative change over the whole range counts as none."""
 
 
 class Least(NamedTuple):
-    """A local minimum: where, how much, and of which kind."""
+    """A local minimum: its place, value and kind."""
 
     at: float
     value: float
@@ -278,7 +278,7 @@ class Least(NamedTuple):
 def minima(found: Scan, function: Function, sign: float = 1.0) -> tuple[Least, ...]:
     """Return the local minima of the quantity of a scan, the least of all first.
 
-    With a sign of -1.0 its maxima, whose values then are negative.
+    With a sign of -1.0 the maxima, with negated values.
     """
     low, high = found.x[0], found.x[-1]
     step = EVEN * found.size
@@ -301,7 +301,7 @@ def minima(found: Scan, function: Function, sign: float = 1.0) -> tuple[Least, .
         x, f = piece.x[kept], rounded(piece.values[kept, 0])
         around = np.concatenate([[np.inf], f, [np.inf]])
         for i in range(len(x)):
-            # The first point of a level stretch stands for all of it; where it is lower on the
+            # The first point of a level stretch represents it; if the function is lower on the
             # other side of a change, there is no minimum.
             if not around[i] > f[i] <= around[i + 2] or f[i] > beyond.get(x[i], np.inf):
                 continue
@@ -311,7 +311,8 @@ def minima(found: Scan, function: Function, sign: float = 1.0) -> tuple[Least, .
             if len(x) > 1:
                 a, b = x[max(i - 1, 0)], x[min(i + 1, len(x) - 1)]
                 place, value = bounded(function, a, b, sign)
-                # The minimiser never reaches an end itself: only a true minimum is lower than it.
+                # The minimiser never reaches an end itself, so only a true minimum is lower than
+                # the end.
                 if value < one.value - (0.0 if inside else step):
                     one = Least(place, value, "inside")
             out.append(one)
@@ -323,7 +324,7 @@ def minima(found: Scan, function: Function, sign: float = 1.0) -> tuple[Least, .
 
 
 def level(found: Scan) -> bool:
-    """Tell whether the quantity is the same over the whole range."""
+    """Whether the quantity is constant over the whole range."""
     values = found.values[:, 0]
     values = values[np.isfinite(values)]
     return bool(len(values)) and float(np.ptp(values)) <= EVEN * float(np.abs(values).max())

@@ -1,17 +1,16 @@
-"""Searches over several keys; and of streams, which are other with each seed.
+"""Searches over several keys, and among streams, which differ from seed to seed.
 
-Without chance a global search is polished: `least`, and `constrained` with limits. With chance,
-`search`: each variant is run with some seeds, the same for all. A Gaussian process is fitted to
-each number that the question asks about (scikit-learn: its regression takes the noise of the means,
-and it is kept well). The next variants are where random draws of what the fit leaves open have
-their answer (Thompson sampling): these are spread over the range as long as little is known, and
-gather at the answer. The error of the answer is how far the answers of such draws differ, and of
-means over seeds that are drawn anew (bootstrap), which sees the error that all variants have in
-common.
+Without chance a global search is followed by a local one: `least`, and `constrained` with limits.
+With chance, `search`: each variant is run with some seeds, the same for all. A Gaussian process is
+fitted to each number in question (scikit-learn: its regression takes the noise of the means, and it
+is well maintained). The next variants are the answers of random functions that the fit considers
+likely (Thompson sampling): they are spread over the range as long as little is known, and gather at
+the answer. The error of the answer is the spread of such answers, and of answers from means over
+redrawn seeds (bootstrap), which contains the error common to all variants.
 
-What else was looked at: `scikit-optimize` is archived, `noisyopt` dates from 2017; `Py-BOBYQA`,
-`cma`, Optuna and `bayesian-optimization` search for the minimum of one function, without an error
-of its place, and targets and limits are three functions or more; BoTorch brings PyTorch.
+Alternatives: `scikit-optimize` is archived, `noisyopt` dates from 2017; `Py-BOBYQA`, `cma`, Optuna
+and `bayesian-optimization` minimise one function, without an error of the place, while targets and
+limits are three functions or more; BoTorch needs PyTorch.
 """
 
 from __future__ import annotations
@@ -30,24 +29,24 @@ from chutelab.util.arrays import Floats
 from chutelab.util.errors import library
 
 PENALTY: Final = 10.0
-"""What missing a target or a limit by its own spread over the range counts, in spreads of what is
-to be least: more than it can gain."""
+"""Penalty for missing a target or limit by its own spread over the range, in spreads of the
+objective: more than the objective can gain."""
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """What is asked of the quantities of a variant, M numbers of each of S seeds.
+    """Targets, limits and objective for the quantities of a variant, M numbers for each of S seeds.
 
     Attributes
     ----------
     targets : tuple of (int, int)
-        Quantities that are to be equal in the mean.
+        Pairs of quantities that should be equal in the mean.
     limits : tuple of (int, float)
-        Quantities whose mean is to be at least a number; negative: ``~index`` at most.
+        Quantities whose mean should be at least a number; ``~index`` (negative): at most.
     objective : int or None
-        What is to be least.
+        The quantity to be minimised.
     sign, deviations : float
-        1 for what is to be least, -1 for most; standard deviations of one run that are added.
+        1 to minimise, -1 to maximise; standard deviations of one run that are added.
     """
 
     targets: tuple[tuple[int, int], ...] = ()
@@ -57,10 +56,10 @@ class Wishes:
     deviations: float = 0.0
 
     def columns(self, values: Floats) -> Floats:
-        """Return what is judged, (..., C), of values (..., S, M).
+        """Return the columns to be judged, (..., C), from values (..., S, M).
 
-        Differences of targets, by how much limits are kept, and what is to be least; the last
-        column is the share of seeds with all quantities, less a half.
+        Differences of targets, margins of limits, and the objective; the last column is the share
+        of seeds with all quantities, less a half.
         """
         seeds = np.moveaxis(values, -2, 0)
         mean, error = mean_and_error(seeds)
@@ -77,14 +76,14 @@ class Wishes:
         return np.stack(found, axis=-1)
 
     def missed(self, columns: Floats, sizes: Floats) -> Floats:
-        """Return by how much each target and limit is missed, (..., T + L + 1), in `sizes`."""
+        """Return the miss of each target and limit, (..., T + L + 1), in `sizes`."""
         off = columns / sizes
         count = len(self.targets)
         kept = [*range(count, count + len(self.limits)), -1]
         return np.concatenate([np.abs(off[..., :count]), np.maximum(0.0, -off[..., kept])], axis=-1)
 
     def merit(self, columns: Floats, sizes: Floats) -> Floats:
-        """Return what is least at the answer, (...); infinite where there is no number."""
+        """Return the merit (least at the answer), (...); infinite without a number."""
         missed = self.missed(columns, sizes)
         if self.objective is None:
             found = np.sum(missed**2, axis=-1)
@@ -94,7 +93,7 @@ class Wishes:
 
 
 def spreads_of(columns: Floats) -> Floats:
-    """Return the spread of each column over some variants, (C,); 1 of what is always the same."""
+    """Return the spread of each column over some variants, (C,); 1 if it is constant."""
     finite = np.isfinite(columns)
     found = np.array(
         [
@@ -110,37 +109,37 @@ def spreads_of(columns: Floats) -> Floats:
 NEEDS: Final = "Searches of streams need scikit-learn"
 
 DRAWS: Final = 64
-"""Draws of what is not known, and of seeds, that errors are told from."""
+"""Draws of functions and of seeds from which errors are computed."""
 
 CLOUD: Final = 400
-"""Points among which the answer of a draw is looked for."""
+"""Points among which the answer of a draw is searched."""
 
 FIRST: Final = 8
-"""Variants a key that are spread over the range first."""
+"""First variants per key, spread over the range."""
 
 BATCH: Final = 6
-"""Variants that are run next, together."""
+"""Variants that are then run together."""
 
 ENOUGH: Final = 0.0025
 """Error of the answer, as a share of each range, at which the search ends."""
 
 ZOOMS: Final = 10
-"""Clouds, each about the best of the one before."""
+"""Number of clouds, each around the best point of the one before."""
 
 
 class Found(NamedTuple):
-    """Where the answer is, (K,), its error, and the variants (N, K) with values (N, S, M)."""
+    """The answer, (K,), its error, and the variants (N, K) with values (N, S, M)."""
 
     at: Floats
     error: Floats
     points: Floats
     values: Floats
-    elsewhere: float  # share of draws whose answer is somewhere else
-    quantities: Sequence[tuple[float, float]]  # each there, in the mean over seeds, and its error
+    elsewhere: float  # share of draws with an answer elsewhere
+    quantities: Sequence[tuple[float, float]]  # each quantity there, mean over seeds, and its error
 
 
 class Fit:
-    """What variants at `shares` of the ranges, (N, K), with values (N, S, M), say of all others."""
+    """Fit to variants at `shares` of the ranges, (N, K), with values (N, S, M)."""
 
     def __init__(
         self, shares: Floats, values: Floats, wishes: Wishes, random: np.random.Generator
@@ -160,17 +159,17 @@ class Fit:
         return mean, mean_and_error(np.moveaxis(values[:, self.redrawn], -1, 0))[0].T
 
     def merit(self, of: Sequence[Floats]) -> Floats:
-        """Return the merit of places, (..., P), whose columns are given one by one."""
+        """Return the merit of points, (..., P), from their columns one by one."""
         return self.wishes.merit(np.stack(of, axis=-1), self.sizes)
 
     def best(self, keys: int) -> tuple[Floats, Floats, Floats]:
-        """Return where the answer is, its error and where all of the range is likely, (n, K)."""
+        """Return the answer, its error, and likely points in the whole range, (n, K)."""
         few = sqrt(self.seeds / (self.seeds - 1)) if self.seeds > 1 else 1.0
         everywhere = self.random.random((CLOUD, keys))
         centre = everywhere[
             np.argmin(self.merit([model.mean(everywhere) for model in self.models]))
         ]
-        # The cloud is to be twice as wide as the answers in it lie apart, in each direction.
+        # The cloud is twice as wide as the spread of its answers, in each direction.
         shape, error = np.diag(np.full(keys, 0.25**2)), np.ones(keys)
         for _ in range(ZOOMS):
             steps = self.random.standard_normal((CLOUD, keys)) @ np.linalg.cholesky(shape).T
@@ -191,7 +190,7 @@ class Fit:
             shape[np.diag_indices_from(shape)] += 1e-14
         wide = np.concatenate([everywhere, cloud])
         open_ = [model.draws(wide, DRAWS, self.random) for model in self.models]
-        # More variants do not help where the error is that of the seeds.
+        # More variants do not help if the error comes from the seeds.
         self.done = bool(np.all((error <= ENOUGH) | (parts[0] <= 0.5 * parts[1])))
         return centre, error, wide[np.argmin(self.merit(open_), axis=-1)]
 
@@ -209,7 +208,7 @@ class Model:
         process = library("sklearn.gaussian_process", NEEDS, "design")
         kernels = process.kernels
         y, redrawn = ((one - self.level) / self.size for one in (column[known], again[:, known]))
-        # What all variants have in common is no noise of the fit, but an error of it.
+        # The part common to all variants is not noise of the fit, but an error of its level.
         own = redrawn - y
         own = own - own.mean(axis=1, keepdims=True)
         noise = float(np.mean(own**2)) * (seeds / (seeds - 1) if seeds > 1 else 1.0)
@@ -219,23 +218,23 @@ class Model:
             kernels.ConstantKernel(1.0, (0.05, 400.0)) * shape, alpha=self.noise
         )
         with warnings.catch_warnings():
-            # A length at its bound says that the column does not depend on the key.
+            # A length at its bound means that the column does not depend on the key.
             warnings.simplefilter("ignore")
             self.fitted.fit(shares[known], y)
         self.redrawn_weights = scipy("linalg").cho_solve((self.fitted.L_, True), redrawn.T)
 
     def mean(self, places: Floats) -> Floats:
-        """Return what is most likely at places (P, K), (P,)."""
+        """Return the most likely values at points (P, K), (P,)."""
         if self.fitted is None:
             return np.full(len(places), self.level)
         return np.asarray(self.level + self.size * self.fitted.predict(places))
 
     def draws(self, places: Floats, count: int, random: np.random.Generator) -> Floats:
-        """Return functions that are as likely, at places (P, K): (count, P)."""
+        """Return random functions of the fit at points (P, K): (count, P)."""
         if self.fitted is None:
             return np.full((count, len(places)), self.level)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of variances below 0 by rounding
+            warnings.simplefilter("ignore")  # warns of variances below 0 by rounding
             mean, spread = self.fitted.predict(places, return_cov=True)
         spread[np.diag_indices_from(spread)] += 1e-8
         root = np.linalg.cholesky(spread)
@@ -263,7 +262,7 @@ class Model:
 def search(
     evaluate: Evaluator, wishes: Wishes, ranges: Sequence[Span], seeds: int, most: int, seed: int
 ) -> Found:
-    """Return where the wishes come true, after at most `most` variants or when time is up."""
+    """Return the best point for the wishes, after at most `most` variants or when time is up."""
     library("sklearn.gaussian_process", NEEDS, "design")
     random, keys = np.random.default_rng(seed), len(ranges)
     low, width = np.array([(one.low, one.width) for one in ranges]).T
@@ -271,18 +270,19 @@ def search(
     power = max(3, (min(FIRST * keys, most) - 1).bit_length())
     nexts = scipy("stats.qmc").Sobol(keys, seed=random).random_base2(power)[:most]
     shares, values = np.empty((0, keys)), np.empty((0, seeds, len(evaluate.quantities)))
-    # On matrices of some hundred rows threads only wait for each other: ten times as long.
+    # With matrices of some hundred rows threads only wait for each other, which takes ten times as
+    # long.
     with library("threadpoolctl", NEEDS, "design").threadpool_limits(1):
         while True:
             new = evaluate.seeds(np.clip(low + nexts * width, low, high), seeds)
-            # If time was up, some have not run.
+            # If time is up, some have not run.
             ran = evaluate.ran
             shares = np.concatenate([shares, nexts[ran]])
             values = np.concatenate([values, new[ran]])
             known = np.flatnonzero(np.isfinite(wishes.columns(values)).all(axis=1))
             ends = evaluate.stopped is not None or len(shares) >= most
             if ends and len(known) < 2:
-                # No fit: the only variant that is known, and nothing of any other.
+                # No fit: return the only variant that is known.
                 at, error = shares[known].sum(axis=0), np.full(keys, 0.5 if len(known) else np.nan)
                 means = zip(*mean_and_error(values[known].sum(axis=0)), strict=True)
                 points = np.clip(low + shares * width, low, high)
@@ -294,7 +294,7 @@ def search(
             except KeyboardInterrupt as interrupt:
                 if evaluate.stopped is not None:
                     raise
-                # The fit once more: it tells what is known.
+                # Fit once more, to report the results so far.
                 evaluate.stopped, nexts = interrupt, nexts[:0]
                 continue
             if ends or fit.done:
@@ -310,7 +310,7 @@ def search(
 
 
 NOWHERE: Final = 1e30
-"""Stands for a variant without the quantity: worse than any other, but a number still."""
+"""Value of a variant without the quantity: worse than any other, but finite."""
 
 
 POPULATION: Final = 12
@@ -318,7 +318,7 @@ POPULATION: Final = 12
 
 
 GENERATIONS: Final = 60
-"""At most; the polish does the last digits."""
+"""Most generations; the local search finds the last digits."""
 
 
 SIMPLEX: Final = {"xatol": 1e-12, "fatol": 1e-15, "maxiter": 600, "adaptive": True}
@@ -327,12 +327,12 @@ SIMPLEX: Final = {"xatol": 1e-12, "fatol": 1e-15, "maxiter": 600, "adaptive": Tr
 def within(ranges: Sequence[Span], shares: Floats) -> Floats:
     """Return points (N, K) of ranges at shares of their widths."""
     low, high = np.array([(one.low, one.high) for one in ranges]).T
-    # low + share * width may pass the end by a rounding, which a scene would refuse.
+    # By rounding low + share * width may pass the end, which a scene would refuse.
     return np.asarray(np.clip(low + shares * (high - low), low, high))
 
 
 def global_least(function: Callable[[Floats], Floats], keys: int, seed: int) -> Any:
-    """Search all of a unit cube for the least value of a function of columns, (K, N) to (N,)."""
+    """Search a unit cube for the minimum of a function of columns, (K, N) to (N,)."""
     return scipy("optimize").differential_evolution(
         function, [(0.0, 1.0)] * keys, seed=seed, popsize=POPULATION, maxiter=GENERATIONS,
         tol=1e-8, atol=1e-12, init="sobol", polish=False, vectorized=True, updating="deferred",
@@ -342,11 +342,11 @@ def global_least(function: Callable[[Floats], Floats], keys: int, seed: int) -> 
 def least(
     function: Callable[[Floats], Floats], ranges: Sequence[Span], seed: int, *, squares: bool
 ) -> tuple[Floats, float]:
-    """Return where a function of several keys is least, shape (K,), and how much it is.
+    """Return the minimum of a function of several keys: its place, (K,), and value.
 
-    It takes points (N, K) and gives (N, 1), NaN where there is no value. With `squares` it gives
-    (N, R), and what is least is the sum of their squares: the polish then is a least-squares one,
-    which gets to the last digits.
+    It takes points (N, K) and returns (N, 1), NaN without a value. With `squares` it returns (N,
+    R), and the sum of squares is minimised: the local search is then a least-squares one, which
+    finds the last digits.
     """
     optimize = scipy("optimize")
 
@@ -382,10 +382,10 @@ def least(
 def constrained(
     columns: Callable[[Floats], Floats], wishes: Wishes, ranges: Sequence[Span], seed: int
 ) -> tuple[Floats, float]:
-    """Return where wishes come true that are more than one, (K,), and by how much they do not.
+    """Return the best point for several wishes, (K,), and by how much they are missed.
 
-    `columns` takes points (N, K) and gives what `Wishes.columns` does. A global search with
-    penalties is polished by sequential quadratic programming.
+    `columns` takes points (N, K) and returns `Wishes.columns`. A global search with penalties is
+    followed by sequential quadratic programming.
     """
     optimize = scipy("optimize")
 
@@ -421,7 +421,7 @@ def constrained(
         searched.x, method="SLSQP", bounds=[(0.0, 1.0)] * len(ranges), constraints=rules,
         options={"ftol": 1e-14, "eps": 1e-7, "maxiter": 200},
     )  # fmt: skip
-    # What is kept to a rounding is kept; of two points that do, the lower one counts.
+    # A limit kept to rounding is kept; of two such points the lower one counts.
     tried = np.stack([np.clip(polished.x, 0.0, 1.0), searched.x])
     found = columns(scaled(tried))
     missed = wishes.missed(found, sizes).max(axis=-1)
@@ -432,4 +432,4 @@ def constrained(
 
 
 KEPT: Final = 1e-6
-"""Miss of a target or limit, in its spread over the range, that is none."""
+"""A smaller miss of a target or limit, in its spread over the range, counts as none."""

@@ -1,4 +1,4 @@
-"""`uncertainty`: how uncertain inputs make a landing point and a belt's work uncertain.
+"""`uncertainty`: the effect of uncertain inputs on quantities such as the landing point.
 
 Inputs are checked against the scene before anything runs. Shares of a variance (Sobol indices) are
 estimated from three sets of points.
@@ -47,7 +47,7 @@ class Indices:
 
 
 def sampled(inputs: int, samples: int, seed: int) -> Floats:
-    """Return sets of shares, 0 to 1, at which a function tells its indices, (K + 2, N, K).
+    """Return sets of shares, 0 to 1, for computing a function's indices, (K + 2, N, K).
 
     A and B are scrambled Sobol points, whose number N is a power of 2; then A with each of its K
     columns in turn taken from B.
@@ -64,11 +64,11 @@ def sampled(inputs: int, samples: int, seed: int) -> Floats:
 def indices(sets: Floats, seed: int) -> Indices:
     """Estimate the indices of a function from its values at `sampled` points, (K + 2, N).
 
-    They may be NaN. `scipy.stats.sobol_indices` takes no samples without a value, and a power of 2
-    of the others. Its bootstrap has no seed, and takes time and memory with the square of the
+    Values may be NaN. `scipy.stats.sobol_indices` needs a value for every sample, and a power of 2
+    of them. Its bootstrap has no seed, and takes time and memory proportional to the square of the
     samples: 3.1 s for 4096 of three inputs, against 0.1 s here.
     """
-    # A point is left out of all sets if one of them has no value there.
+    # A point is left out of all sets if any of them has no value there.
     sets = sets[:, np.isfinite(sets).all(axis=0)]
     count = sets.shape[1]
     if count < 2:
@@ -86,7 +86,7 @@ def _estimates(sets: Floats) -> tuple[Floats, Floats]:
     middle, variance = sets[:2].mean(), sets[:2].var()
     if variance <= (1e-14 * np.abs(sets[:2]).max()) ** 2:
         return np.full(len(f_ab), np.nan), np.full(len(f_ab), np.nan)
-    # Around the mean: the products lose fewer digits, and scatter less.
+    # Relative to the mean, so that products lose fewer digits and scatter less.
     saltelli = np.mean((f_b - middle) * (f_ab - f_a), axis=1) / variance
     jansen = 1.0 - 0.5 * np.mean((f_b - f_ab) ** 2, axis=1) / variance
     share = np.clip(jansen, 0.0, 1.0)
@@ -100,10 +100,10 @@ ASK: Final = "say what is uncertain, and by how much, such as a restitution of 0
 LAWS: Final = ("normal", "uniform")
 
 HOMES: Final = ("plate", "incoming", "outgoing", "particle", "stream")
-"""Tables in which a name without one is looked for, in this order."""
+"""Tables in which a name without a table is searched, in this order."""
 
 MOST: Final = 12
-"""Uncertain inputs at once."""
+"""Most uncertain inputs at once."""
 
 
 class Given(NamedTuple):
@@ -139,7 +139,7 @@ class Spread:
 
     @property
     def whole(self) -> Any:
-        """The distribution, as SciPy has it, uncut."""
+        """The distribution of SciPy, uncut."""
         stats = scipy("stats")
         if self.law == "uniform":
             return stats.uniform(self.mean - self.spread, 2.0 * self.spread)
@@ -151,16 +151,16 @@ class Spread:
         return float(self.whole.cdf(self.low) + self.whole.sf(self.high))
 
     def values(self, shares: Floats) -> Floats:
-        """Return the values below which given shares, 0 to 1, of the (cut) distribution lie."""
+        """Return the quantiles of the (cut) distribution at given shares, 0 to 1."""
         low, high = self.whole.cdf([self.low, self.high])
         # Sobol points begin at 0, where a normal distribution has no value.
         found = self.whole.ppf(low + np.clip(shares, 1e-12, 1.0 - 1e-12) * (high - low))
-        # Rounding must not take a value past what the scene allows.
+        # Rounding must not move a value beyond what the scene allows.
         return np.asarray(np.clip(found, self.low, self.high))
 
 
 def spreads(scene: Scene, asked: Sequence[Given]) -> tuple[Spread, ...]:
-    """Return how inputs are distributed; each is tried on the scene."""
+    """Return the distributions of inputs; each is tried on the scene."""
 
     def read(given: Given) -> Spread:
         key, typed = given.key, given.typed
@@ -213,16 +213,16 @@ def spreads(scene: Scene, asked: Sequence[Given]) -> tuple[Spread, ...]:
 
 
 QUANTITIES: Final = ("landing.x", "belt_work")
-"""What is looked at unless said, of a lone particle."""
+"""Default quantities for one particle."""
 
 OF_A_STREAM: Final = ("arrival.x.mean", "ledger.by_surface.outgoing.belt_work")
-"""The same of several particles; the work is counted up to ``run.until``."""
+"""Default quantities for several particles; the work counts up to ``run.until``."""
 
 SAMPLES: Final = 1024
-"""Of each of the K + 2 sets of points: indices to about a hundredth."""
+"""Samples in each of the K + 2 sets of points: gives indices to about a hundredth."""
 
 NOTHING: Final = 1e-9
-"""Share of a distribution that is not worth a sentence."""
+"""A smaller share of a distribution is not mentioned."""
 
 FEWEST: Final = 64
 MOST_SAMPLES: Final = 1 << 20
@@ -230,7 +230,7 @@ MOST_SAMPLES: Final = 1 << 20
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """Of M quantities over some samples; those without a value do not count."""
+    """Statistics of M quantities over some samples; those without a value do not count."""
 
     share: float  # of all samples
     # (M,); means and standard deviations; NaN without a single value
@@ -252,7 +252,7 @@ def statistics(outputs: Floats, total: int) -> Statistics:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Uncertainty(Shown):
-    """What becomes of uncertain inputs, N samples of K inputs and M quantities.
+    """Effect of uncertain inputs: N samples of K inputs and M quantities.
 
     Attributes
     ----------
@@ -261,17 +261,17 @@ class Uncertainty(Shown):
     spreads : tuple of Spread
         The inputs.
     quantities, units : tuple of str
-        What is looked at.
+        The quantities and their units.
     nominal : ndarray, shape (M,)
         The quantities with all inputs at their means.
     inputs, outputs : ndarray, shape (N, K) and (N, M)
-        A sample of the inputs, and what came of it, NaN where it did not happen.
+        Samples of the inputs and their results, NaN if they did not happen.
     touches : ndarray of str, shape (N,)
-        The kind of each outcome: which surfaces are met, see `chutelab.studies.sweep.rows`.
+        The kind of each outcome: the surfaces met, see `chutelab.studies.sweep.rows`.
     indices : tuple of Indices
         Of each quantity.
     lost : dict of str
-        Why samples lack a value, of which quantities, and how many.
+        Reasons why samples lack a value, with the quantities and numbers.
     runs, samples, seed : int
         Variants that were run, samples of each set, and the seed of the points.
     """
@@ -292,7 +292,7 @@ class Uncertainty(Shown):
 
     @cached_property
     def overall(self) -> Statistics:
-        """Of all samples, whatever they touch."""
+        """Statistics of all samples, whatever they touch."""
         return statistics(self.outputs, len(self.outputs))
 
     @property
@@ -312,7 +312,7 @@ class Uncertainty(Shown):
 
     @cached_property
     def kinds(self) -> dict[str, Statistics]:
-        """Of the samples of each kind of outcome, the most frequent one first; all kinds."""
+        """Statistics of each kind of outcome, the most frequent one first."""
         counts = Counter(self.touches.tolist())
         return {
             kind: statistics(self.outputs[self.touches == kind], len(self.outputs))
@@ -321,7 +321,7 @@ class Uncertainty(Shown):
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Inputs, outputs and what is touched by name, (N,) each."""
+        """Inputs, outputs and touched surfaces by name, (N,) each."""
         names = (*(one.key for one in self.spreads), *self.quantities, TOUCHES)
         return dict(zip(names, (*self.inputs.T, *self.outputs.T, self.touches), strict=True))
 
@@ -361,7 +361,7 @@ class Uncertainty(Shown):
         )  # fmt: skip
 
     def notes(self) -> list[str]:
-        """Return what to know beside the numbers, in sentences."""
+        """Return remarks on the numbers, in sentences."""
         said = [
             "Each ± is a standard deviation, of a uniform input the half-width.",
             "Shares are first-order Sobol indices, the part of the variance that an input explains"
@@ -422,8 +422,7 @@ def uncertainty(
         value, and SPREAD in per cent of it. SPREAD is a standard deviation, or with "uniform" as a
         third entry a half-width.
     quantities : sequence of str
-        What is looked at, see `chutelab.scene.quantities`; default: `QUANTITIES`, or
-        `OF_A_STREAM`.
+        Names, see `chutelab.scene.quantities`; default: `QUANTITIES`, or `OF_A_STREAM`.
     samples : int
         Points of each of the K + 2 sets, a power of 2 (else the next one is taken).
     seed : int

@@ -322,3 +322,20 @@ def test_what_is_held_between_carried_disks_rattles_no_longer_than_it_helps():
     recording = simulate(slower, engine="contact", max_seconds=20.0)
     assert (recording.ended == REASONS.index("landed")).all()
     assert recording.steps < 1.1 * recording.knots["t"].max() / slower.run.dt
+
+
+def test_what_rolls_on_to_a_next_face_does_so_as_if_nothing_else_lay_at_rest():
+    """A disk that slid rolls at 2/3 of its speed, spin -v/r; one on a belt is calm but awake."""
+    rough = {"friction": 0.3, "restitution": 0.0}
+    faces = [face("first", (0.0, 0.0), (1.0, 0.0), **rough),
+             face("next", (1.0, 0.0), (2.5, 0.0), **rough),
+             face("belt", (-5.0, 1.0), (5.0, 1.0), speed=0.05, **rough)]  # fmt: skip
+    rides = {"at": [-1.0, 1.0 + R], "velocity": [0.05, 0.0]}
+    rolls = {"at": [0.5, R], "velocity": [1.8, 0.0], "interact": True}
+    scene = {"particle": {"radius": R, "mass": 0.1, "spin": True}, "surface": faces,
+             "stream": [rolls, rides], "run": {"until": "settled", "max_time": 1.0}}  # fmt: skip
+    recording = simulate(scene, engine="contact")
+    (passed,) = recording.select("stick", surface="next")
+    assert passed["velocity_before"] == pytest.approx([1.2, 0.0], rel=1e-9, abs=1e-9)
+    assert passed["omega_before"] == pytest.approx(-1.2 / R, rel=1e-9)
+    assert passed["position"] == pytest.approx([1.0, R], abs=1e-6)

@@ -62,8 +62,8 @@ void fall_asleep(void) {
     int ready = 0;
     for (EACH_LIVE(i)) ready |= W.disks[i].mode == FREE && W.disks[i].rest >= CALM_DOWN / W.pace;
     if (!ready || !W.sleeps || !W.contact_count) return;
-    /* Of each island, at its root: may it sleep, and how do its surfaces move? `found` counts the
-       disks that may not, `ux`, `uy` are free to hold the velocity once the step is closed. */
+    /* For each island, at its root: `found` counts what prevents its sleep, `moved` is the owner of its surfaces or -1, and
+       `tugged` holds their velocity, as nothing needs it between two steps. */
     for (EACH_LIVE(i)) {
         W.found[i] = 0;
         W.moved[i] = -1;
@@ -79,7 +79,7 @@ void fall_asleep(void) {
         const Contact *c = W.contacts + n;
         int k = island_of(c->i);
         if (c->impulse[0] == 0 || c->two) continue;
-        if (c->j >= 0 || !joins(c, &W.tracks[k].past[4], W.moved + k)) W.found[k]++;
+        if (c->j >= 0 || !joins(c, W.disks[k].tugged, W.moved + k)) W.found[k]++;
     }
     /* What rattles in its place would wake those next to it: they wait until it touches something. */
     for (int n = 0; n < 2 * W.near_count; n++) {
@@ -96,7 +96,7 @@ void fall_asleep(void) {
         Track *track = W.tracks + i;
         int k = island_of(i);
         if (d->mode != FREE || W.found[k] || W.moved[k] < 0) continue;
-        const double *s = track->held, *u = &W.tracks[k].past[4];
+        const double *s = track->held, *u = W.disks[k].tugged;
         double x = u[0] - s[3], y = u[1] - s[4];
         double entries[3] = {d->mass * (x * u[0] + y * u[1]),
                              0.5 * d->mass * (x * x + y * y) + 0.5 * d->inertia * s[5] * s[5], 0};

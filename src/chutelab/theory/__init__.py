@@ -17,13 +17,26 @@ chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167
 Only NumPy, `chutelab.scene` and `chutelab.util` are imported.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from chutelab.theory.drag import Drag, drag
-from chutelab.theory.paper import TABLES, Table, table
 from chutelab.theory.prediction import predict, unbounded
 from chutelab.theory.slide import Reason, Slide, slide
 from chutelab.theory.transfer import STAGES, Rebound, Transfer, belt_power, transfer
+
+if TYPE_CHECKING:
+    from chutelab.theory.paper import TABLES, Table, table
 
 __all__ = [
     "STAGES", "TABLES", "Drag", "Reason", "Rebound", "Slide", "Table", "Transfer", "belt_power",
     "drag", "predict", "slide", "table", "transfer", "unbounded",
 ]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """Read the paper's tables once something asks for them: that takes 4 ms."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from chutelab.theory import paper
+
+    return getattr(paper, name)

@@ -81,7 +81,7 @@ def by_hand(residual=0.0, shift=0.0):
     after = np.array([-EPS * V, before[1]])
     now = BELT_TIME + t_impact()
     knot(now, hit, before)
-    recorder.book([0], [1], restitution_loss=0.5 * MASS * V**2 * (1.0 - EPS**2))
+    recorder.book(0, 1, restitution_loss=0.5 * MASS * V**2 * (1.0 - EPS**2))
     knot(now, hit, after)
     recorder.events(
         Kind.IMPACT, [0], [now], hit, after, velocity_before=before, surface=1,
@@ -94,7 +94,7 @@ def by_hand(residual=0.0, shift=0.0):
     knot(now, place + lifted, down)
     work, lost = push * V, 0.5 * MASS * down[1] ** 2
     gained = 0.5 * MASS * (carried @ carried - down @ down)
-    recorder.book([0], [2], work, lost, work - lost - gained - residual)
+    recorder.book(0, 2, work, lost, work - lost - gained - residual)
     knot(now, place + lifted, carried)
     recorder.events(
         Kind.LANDING, [0], [now], place + lifted, carried, velocity_before=down, surface=2,

@@ -209,18 +209,16 @@ class Recorder:
 
     def book(
         self,
-        particle: ArrayLike,
-        surface: ArrayLike,
-        belt_work: ArrayLike = 0.0,
-        restitution_loss: ArrayLike = 0.0,
-        friction_loss: ArrayLike = 0.0,
+        particle: int,
+        surface: int,
+        belt_work: float = 0.0,
+        restitution_loss: float = 0.0,
+        friction_loss: float = 0.0,
     ) -> None:
-        """Book ledger entries (J) on particles (k,), each once, and on the surfaces they met."""
-        owner = np.atleast_1d(np.asarray(particle, dtype=np.int64))
-        entry = np.empty((len(owner), 3))
-        entry[:, 0], entry[:, 1], entry[:, 2] = belt_work, restitution_loss, friction_loss
-        self.entries[owner] += entry
-        np.add.at(self.by_surface, np.broadcast_to(surface, owner.shape), entry)
+        """Book ledger entries (J) on a particle and on the surface it met."""
+        entry = belt_work, restitution_loss, friction_loss
+        self.entries[particle] += entry
+        self.by_surface[surface] += entry
 
     def events(
         self,

@@ -59,6 +59,17 @@ NONE = (Vec2d.zero(), Vec2d.zero())
 """Crowns of a face without ends."""
 
 
+def direction(begin: Vec2d, end: Vec2d) -> Vec2d:
+    """Return the unit vector from one place to another, 0 if they are one.
+
+    In plain numbers, as operators of Vec2d take ten times as long.
+    """
+    (x, y), (u, v) = begin, end
+    x, y = u - x, v - y
+    far = sqrt(x * x + y * y) or 1.0
+    return Vec2d(x / far, y / far)
+
+
 @dataclass(frozen=True, eq=False)
 class Face:
     """A straight surface, as a segment without thickness, the pulley, as a circle, or a point.
@@ -103,7 +114,7 @@ class Face:
         Closer than 1e-5 m Chipmunk returns the segment's own normal, on either side.
         """
         found = self.shape.point_query(x)
-        normal = found.gradient if self.tangent is None else (x - found.point).normalized()
+        normal = found.gradient if self.tangent is None else direction(found.point, x)
         return found.distance - self.radius, normal
 
     def side(self, x: Vec2d) -> float:
@@ -183,8 +194,8 @@ class Bend(Face):
 
         Closer to the centre than 1e-5 m Chipmunk returns a fixed direction.
         """
-        away = x - self.center
-        return away.normalized() if away.length > 0.0 else Vec2d(0.0, 1.0)
+        center = self.center
+        return direction(center, x) if x != center else Vec2d(0.0, 1.0)
 
     def gap(self, x: Vec2d) -> tuple[float, Vec2d]:
         """Return the gap (m) and the normal; inf where an end is nearest."""
@@ -537,6 +548,7 @@ class Carriage:
         place = Vec2d(*start.position[particle].tolist())
         self.x, self.rho = place.dot(self.along), place.dot(self.up)
         self.speed = Vec2d(*start.velocity[particle].tolist()).dot(self.along)
+        self.pace = self.along * self.speed
         self.until, self.height, self.written = machine.end_time, place.y, -inf
         self.top = inf
         if self.speed > 0.0:
@@ -553,7 +565,9 @@ class Carriage:
         """Return place (m) and velocity (m/s) a time (s) after the start."""
         way = self.x + self.speed * after
         if way <= 0.0:
-            return self.along * way + self.up * self.rho, self.along * self.speed
+            # In plain numbers, as in `Flight`.
+            (x, y), (u, v), rho = self.along, self.up, self.rho
+            return Vec2d(x * way + u * rho, y * way + v * rho), self.pace
         angle = way / self.rho - self.incline
         c, s = cos(angle), sin(angle)
         return Vec2d(self.rho * s, self.rho * c), Vec2d(self.speed * c, -self.speed * s)

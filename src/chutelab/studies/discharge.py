@@ -1,4 +1,4 @@
-"""The stream as engineers' methods have it, beside the one that is simulated.
+"""The stream by engineers' methods, beside the simulated one.
 
 >>> from chutelab.studies.discharge import side_by_side
 >>> found = side_by_side("low-speed", heights=[-0.5])
@@ -27,10 +27,10 @@ HEIGHTS = (0.0, -0.2, -0.4, -0.6, -0.8, -1.0)
 """Heights above the pulley's axis at which streams are compared, m."""
 
 DEEPEST = 100.0
-"""Farthest below the axis that a height may be, m."""
+"""Lowest height, below the axis, m."""
 
 LOOK = 1e-3
-"""Time between two looks at the simulated paths, s; they are straight between: 1e-6 m."""
+"""Time between two samples of the simulated paths, s; taken straight between, to 1e-6 m."""
 
 EDGES = ("lower", "centre", "upper")
 
@@ -39,13 +39,13 @@ EDGES = ("lower", "centre", "upper")
 class SideBySide:
     """Streams by all methods and by simulation."""
 
-    # what was simulated: belt and particles of the scene that was asked for, and nothing else
+    # the simulated scene: only belt and particles of the given one
     scene: Scene
     heights: Floats  # (H,), above the pulley's axis, m
     methods: dict[str, Discharge]  # the stream of each method that has an answer
-    # x (m) of lower edge, centre and upper edge at the heights, (3, H), of each of them and of
-    # "simulated"; NaN where it has none. Edges of the simulated stream are half a particle outside
-    # the paths of the centres, of which 2, 50 and 98 % lie below
+    # x (m) of lower edge, centre and upper edge at the heights, (3, H), for each of them and for
+    # "simulated"; NaN without one. Edges of the simulated stream are half a particle outside the 2,
+    # 50 and 98 % quantiles of the centres
     lines: dict[str, Floats]
     refused: dict[str, str]  # why another method has no answer
     recording: Recording  # the run
@@ -98,13 +98,14 @@ class SideBySide:
 def side_by_side(
     scene: AnyScene, heights: Sequence[float] = HEIGHTS, *, progress: Progress | None = None
 ) -> SideBySide:
-    """Compare all methods with a simulation of what the incoming belt throws off, in free flight.
+    """Compare all methods with a simulation of the stream from the incoming belt, in free flight.
 
-    Plate, surfaces and the outgoing belt are left out of it. The bed is as deep as the layers of
-    the first stream with half a particle below and above.
+    Plate, surfaces and the outgoing belt are left out. The depth of the bed is that of the layers
+    of the first stream plus half a particle below and above.
 
     Raises a `DischargeError` for a scene without an incoming belt, or whose first stream is not
-    released on it, and of heights (m) that are no numbers, all above the pulley or below `DEEPEST`.
+    released on it, and for heights (m) that are not numbers, all above the pulley or below
+    `DEEPEST`.
     """
     whole = load(scene)
     if (belt := whole.incoming) is None:
@@ -130,7 +131,7 @@ def side_by_side(
     free["stream"] = streams[0] if isinstance(streams, tuple) else streams
     free["run"] = {"until": last, "dt": whole.run.dt}
     if (low := float(wanted.min())) < -1.0:
-        # A run ends 1 m below its lowest surface: this one is behind all that flies.
+        # A run ends 1 m below its lowest surface, so this one is put behind the whole stream.
         behind = -belt.length - 10.0 * belt.pulley_radius
         free["surface"] = [{"name": "low", "from": [behind - 1.0, low], "to": [behind, low]}]
     alone = from_dict(free)

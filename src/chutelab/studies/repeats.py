@@ -2,8 +2,8 @@
 
 `repeat("stream", 12)["landing.x.mean"]` is one of them.
 
-The seeds 0 to N - 1 are added to those of the scene's streams, as in `sweep` and `solve`: what is
-compared was drawn alike.
+The numbers 0 to N - 1 are added to the seeds of the scene's streams, as in `sweep` and `solve`, so
+that compared runs have the same draws.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ class Mean(NamedTuple):
     runs: int  # n, seeds with a value
 
     def exact(self) -> Mean:
-        """Return it without spread: all runs have the same but for rounding."""
+        """Return the mean without spread, for runs that agree to rounding."""
         return self._replace(error=0.0, spread=0.0)
 
 
 ROUNDING: Final = 1e-12
-"""Relative spread over seeds that is none."""
+"""A smaller relative spread over seeds counts as none."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,11 +58,11 @@ class Repeats(Shown):
     scene : Scene
         With its own seeds, those of the first run.
     numbers : tuple of int
-        What was added to the seeds, of each run that counts.
+        The number added to the seeds, for each run that counts.
     quantities : mapping of str to Quantity
-        All that the scene has.
+        All quantities of the scene.
     values : mapping of str to ndarray, (N,)
-        Each quantity of each run; NaN where it did not happen.
+        Each quantity of each run; NaN if it did not happen.
     faults : mapping of str to int
         Why runs are left out, and how many.
     asked : int
@@ -77,7 +77,7 @@ class Repeats(Shown):
     asked: int
 
     def __getitem__(self, name: str) -> Mean:
-        """Return a quantity as mean and error; a KeyError if the scene has none such."""
+        """Return a quantity as mean and error; a KeyError if the scene does not have it."""
         values = self.values[name]
         mean, error = (float(one) for one in mean_and_error(values))
         count = int(np.isfinite(values).sum())
@@ -87,7 +87,7 @@ class Repeats(Shown):
         return len(self.numbers)
 
     def shown(self) -> Iterator[tuple[Quantity, Mean]]:
-        """Yield the quantities that happened, and are no rounding in every run."""
+        """Yield the quantities that happened, and are more than rounding in some run."""
         for name, row in self.quantities.items():
             whole = self.values.get(name.removesuffix("spread") + "mean", self.values[name])
             if np.any(np.abs(self.values[name]) > ROUNDING * np.abs(whole)):
@@ -171,7 +171,7 @@ def repeat(
     InputError
         If nothing is drawn in the scene, or no run has numbers.
     KeyboardInterrupt
-        By Ctrl-C, with what has run as its ``repeats``, if any has.
+        By Ctrl-C, with the finished runs as its ``repeats``, if there are any.
     """
     scene, ends = load(scene), monotonic() + max_seconds
     drawn(scene, count)

@@ -1,17 +1,17 @@
-"""The oracle: the paper's model in closed form, sharing no code with the engines.
+"""The paper's model in closed form, sharing no code with the engines.
 
 V. Molnár et al., "Energy calculation model of an outgoing conveyor with application of a transfer
 chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167-2016.
 
 - `transfer`: Eqs. (2)-(16) and their generalisations, vectorised: of plain numbers a `Transfer`.
-- `slide`: sliding and rolling on a round surface: along a chute, and round the pulley to where it
-  is left, by adhesion, at finite friction, or by bodies that roll; why there is no answer.
+- `slide`: sliding and rolling on a round surface: along a chute, and round the pulley up to
+  separation, with adhesion, finite friction, or rolling; reasons for no answer.
 - `discharge`: where a bed leaves its pulley by five methods of engineers; loading points.
 - `prediction`: `predict`, particle 0 of a scene, or the reason why the closed form does not hold
   for it; `unbounded`, the same without looking at the finite machine.
-- `obstacles`: which surface is met first in a flight, or on the ride.
-- `drag`: what air drag, left out everywhere else, would do.
-- `paper`: the paper's tables beside what the equations give.
+- `obstacles`: the first surface met in a flight, or on the ride.
+- `drag`: an estimate of air drag, which the theory leaves out.
+- `paper`: the paper's tables beside computed values.
 - `figures`: its figures.
 
 Only NumPy, `chutelab.scene` and `chutelab.util` are imported.

@@ -16,10 +16,10 @@ korzen      the centroid's path, with two coefficients of friction, adhesion and
             (Korzen 1989)
 ==========  =======================================================================================
 
-The originals were not at hand: the methods are as the reviews of D. B. Hastie and P. W. Wypych
-(2005 to 2010) have them. CEMA's choice of speed is from memory; Golka's h' is derived from
-continuity, Korzen's slip from the balance of forces. M.H.E.A., Goodyear and Dunlop are left out, as
-their rules are not known well enough.
+The originals were not available: the methods follow the reviews of D. B. Hastie and P. W. Wypych
+(2005 to 2010). CEMA's choice of speed is from memory; Golka's h' is derived from continuity,
+Korzen's slip from the balance of forces. M.H.E.A., Goodyear and Dunlop are left out, as their rules
+are not known well enough.
 """
 
 from __future__ import annotations
@@ -42,20 +42,20 @@ METHODS: Final[tuple[Method, ...]] = get_args(Method)
 NAMES: Final[dict[str, str]] = {
     "point": "mass point", "cema": "CEMA", "booth": "Booth", "golka": "Golka", "korzen": "Korzen",
 }  # fmt: skip
-"""What pictures call the methods."""
+"""Names of the methods in pictures."""
 
 LEFT_OUT: Final = ("M.H.E.A.", "Goodyear", "Dunlop")
 """Methods in use whose rules are not known well enough."""
 
 HALVINGS = 64
-"""Bisections of an angle or a time: they exhaust a double's digits."""
+"""Bisections of an angle or a time, enough for all digits of a double."""
 
 STEP = 2e-3
 """Longest Runge-Kutta step in air, s."""
 
 
 class DischargeError(InputError):
-    """A value is out of range, or the bed does not leave the pulley as the method has it."""
+    """A value is out of range, or the bed does not leave the pulley by the method."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Path:
     angle, speed, radius : float
         α (rad) and V (m/s) where it leaves the circle of radius r (m) round the pulley's axis.
     gravity : float
-        That acts on it, m/s²; a divergence coefficient is in it.
+        Acceleration on it, m/s², including a divergence coefficient.
     offset : float
         Distance of the layer from the path of that circle, along its upper normal, m.
     sphere : tuple of float, optional
@@ -118,9 +118,9 @@ class Path:
 
 @dataclass(frozen=True)
 class Discharge:
-    """The stream as a method has it: paths of its edges and of its centre; None where it has none.
+    """The stream by a method: paths of its edges and of its centre; None if it has none.
 
-    `high_speed` says whether it leaves where the belt meets the pulley.
+    `high_speed`: whether it leaves where the belt meets the pulley.
     """
 
     method: Method
@@ -131,7 +131,7 @@ class Discharge:
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """The edges, or the centre of a method that has none."""
+        """The edges, or the centre if the method has no edges."""
         found = (self.lower, self.upper) if self.upper is not None else (self.centre,)
         return tuple(path for path in found if path is not None)
 
@@ -165,11 +165,11 @@ def discharge(
     incline : float
         Angle β at which the belt rises to the pulley, rad.
     friction, static_friction : float
-        µ_k (Booth, Korzen), and µ_s (Korzen) if it is not the same; inf is no slip.
+        µ_k (Booth, Korzen), and µ_s (Korzen) if it differs; inf for no slip.
     adhesion, unit_weight : float
         σ_a of bed and belt (N/m²) and weight of the bed over its volume (N/m³), Korzen.
     sphere : tuple of float, optional
-        Radius (m) and mass (kg) of what air slows down after Korzen; without it, none.
+        Radius (m) and mass (kg) of the spheres slowed down by air with Korzen; without it, none.
     divergence : tuple of float
         Golka's coefficients of lower and upper edge, which multiply the fall.
     gravity : float
@@ -178,7 +178,7 @@ def discharge(
     Raises
     ------
     DischargeError
-        Of a value out of range, and where the bed slips back, or does not leave.
+        For a value out of range, and if the bed slips back or does not leave.
 
     Examples
     --------
@@ -307,7 +307,7 @@ def bed_area(*, width: float, roll: float, trough: float, surcharge: float) -> f
 
 @dataclass(frozen=True)
 class Loading:
-    """What it takes to bring a stream to the speed of the belt it falls on.
+    """Force and power needed to bring a stream to the speed of the belt it falls on.
 
     `force` (N) on the belt along its way, `length` (m) of the way on which it still slips, `power`
     (W) of the drive; the half of it or more that is slip heat is in it.

@@ -1,7 +1,7 @@
-"""What air drag, which all else leaves out, would do to a scene: an estimate.
+"""An estimate of the effect of air drag on a scene without it.
 
-The particle is taken for a sphere of its radius in still air of 20 °C; long or flat pieces have
-more drag. The flights of particle 0 are integrated with it; its impact on the plate is as without.
+The particle counts as a sphere of its radius in still air of 20 °C; long or flat pieces have more
+drag. The flights of particle 0 are integrated with drag; its impact on the plate is unchanged.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ AIR_DENSITY = 1.2
 """kg/m³, at 20 °C and sea level."""
 
 AIR_VISCOSITY = 1.8e-5
-"""Pa s, there."""
+"""Pa s, under the same conditions."""
 
 STEPS = 24
-"""Fourth-order steps of a flight; what they miss is 1e-7 of what drag does."""
+"""Fourth-order steps of a flight; their error is 1e-7 of the effect of drag."""
 
 MOST_STEPS = 20_000
-"""Dust, which air stops within microns, would take more: no answer."""
+"""Most steps; dust, which air stops within microns, would take more and gets no answer."""
 
 State = tuple[complex, complex]
 """Place, x + i y (m), and velocity (m/s) likewise."""
@@ -37,12 +37,12 @@ State = tuple[complex, complex]
 
 @dataclass(frozen=True)
 class Drag:
-    """What air drag would do, for people as text.
+    """Effect of air drag; as text for people.
 
     Attributes
     ----------
     speed : float
-        Speed for which the next three are told, the highest known, m/s.
+        The highest known speed, for which the next three hold, m/s.
     reynolds, coefficient : float
         Reynolds number and drag coefficient of a sphere of the particle's radius.
     slowing : float
@@ -51,11 +51,11 @@ class Drag:
         Drag over weight; NaN without gravity.
     impact_shift : float
         How much higher particle 0 would meet the plate, m (negative: lower); NaN without a closed
-        form, or if it would not get so far.
+        form, or if it would not get there.
     landing_shift : float
         How much farther forward it would come down on the outgoing belt, m; NaN likewise.
     arrives : bool
-        False if air would keep it from getting as far as the closed form has it.
+        False if with air it would not get as far as in the closed form.
     """
 
     speed: float
@@ -72,7 +72,7 @@ class Drag:
 
     @property
     def effect(self) -> str:
-        """How large it is, and what it would change, in words."""
+        """Size and effect of the drag, in words."""
         share = f"{100.0 * self.share_of_weight:.2g} % of the weight"
         if self.share_of_weight >= 1.0:
             share = f"{self.share_of_weight:.3g} times the weight"
@@ -111,18 +111,18 @@ def drag(
     scene: Scene, found: Transfer, speed: float, radius: float | None = None,
     mass: float | None = None,
 ) -> Drag | None:  # fmt: skip
-    """Estimate air drag in a scene; None for mass points, which have none, and where nothing moves.
+    """Estimate air drag in a scene; None for mass points, which have none, and if nothing moves.
 
     Parameters
     ----------
     scene : Scene
         A validated scene.
     found : Transfer
-        What `predict` says of it.
+        The result of `predict` for it.
     speed : float
         Highest speed that a particle has, m/s; particle 0 at its landing may be faster.
     radius, mass : float, optional
-        Of the particle that has it, if it is not particle 0.
+        Radius and mass of the fastest particle, if it is not particle 0.
     """
     own = scene.particles[scene.kinds[0]]
     fastest = [speed, *(float(part) for part in (found.v2, found.v3) if np.isfinite(part))]
@@ -201,10 +201,10 @@ def step(state: State, rate: Callable[[complex], complex], h: float) -> State:
 def fly(
     start: State, rate: Callable[[complex], complex], gap: Callable[[complex], float], about: float
 ) -> State | None:
-    """Fly until a gap closes; None if it does not in three times the time that it takes about, s.
+    """Fly until a gap closes; None if it does not in three times the expected time, s.
 
     `rate` gives the acceleration (m/s²) from the velocity, `gap` a distance (m) from the place.
-    The last step is cut where the gap, taken for linear and then by secants, is 0.
+    The last step is shortened to where the gap is 0, by linear interpolation and then secants.
     """
     vx = start[1].real
     relief = -rate(start[1]).real / vx if vx else 0.0

@@ -5,11 +5,11 @@
 
 Figures 6 to 9 show energy and velocities against the radius of the drive pulley. Figures 11 to 13
 show trajectories: the paper drew them with a multibody program, in which Eq. (9) has no part. Here
-they are computed as they should be, and as they would be if Eq. (9) held as printed, with φ2
-counted from the inclined plate, as Eqs. (7) and (8) count it.
+they are computed correctly, and as they would be if Eq. (9) held as printed, with φ2 measured from
+the inclined plate, as in Eqs. (7) and (8).
 
 V. Molnár et al., Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167-2016. The paper's pictures are
-not copied: what its text gives is computed anew, and what it does not give is said.
+not copied: values in its text are computed again, and missing ones are listed.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ SAID: Final = {"as-printed": "Eq. (9) as printed", "corrected": "Eq. (9) correct
 class Line:
     """One line of a panel: its points, and those (M, 2) that are marked on it.
 
-    The label is for the legend, "" for none. The role says what it is drawn like: "first" to
-    "fourth", "plate" or "belt".
+    The label is for the legend, "" for none. The role chooses its look: "first" to "fourth",
+    "plate" or "belt".
     """
 
     label: str
@@ -79,17 +79,17 @@ class PaperFigure(Shown):
     title : str
         What it shows.
     panels : tuple of Panel
-        By twos: as printed, corrected.
+        In pairs: as printed, corrected.
     meaning : tuple of str
-        What the misprint does to the figure's conclusion.
+        Effect of the misprint on the figure's conclusion.
     missing : tuple of str
-        What the paper's text does not give, and what is taken instead.
+        Values missing in the paper's text, and those used instead.
     columns : dict of ndarray
         The numbers, by name with unit; one length.
     rows : list of int
         Which of them are shown as a table.
     scenes : dict of Scene
-        What is behind it, by file name without suffix.
+        The scenes behind it, by file name without suffix.
     sweep : str
         The command that makes its corrected side with the engine; "" without a sweep.
     """
@@ -134,7 +134,7 @@ DRAWINGS: Final = {
     5: "a drawing of the velocities at the outgoing belt",
     10: "a view of the simulated model, without results",
 }
-"""Figures that show none, and what they are."""
+"""Figures without results, and their content."""
 
 
 class FigureError(InputError):
@@ -176,7 +176,7 @@ def worded(
     scenes: dict[str, Scene],
     sweep: str = "",
 ) -> PaperFigure:
-    """Return a figure whose words take computed values in their braces."""
+    """Return a figure with computed values filled into its words."""
     title = words["title"].format(**values)
     meaning, missing = (
         tuple(text.format(**values) for text in words[kind]) for kind in ("meaning", "missing")
@@ -206,7 +206,7 @@ GRID: Final = np.unique(np.concatenate([np.linspace(0.05, 0.5, 91), np.array(RAD
 """Radii, m: those of the paper's tables, and enough between them for a smooth line."""
 
 SHOWN: Final = np.searchsorted(GRID, np.array(RADII, dtype=float)).tolist()
-"""Which of them the tables have."""
+"""The radii of the tables."""
 
 NEAR, FAR = float(DISTANCES[0]), float(DISTANCES[-1])
 """Least and largest d_okr of the paper's tables, m."""
@@ -277,13 +277,13 @@ def against_the_radius(number: int) -> PaperFigure:
 # Figures 11 to 13: trajectories with an upright plate and with inclined ones.
 
 POINTS: Final = 61
-"""Of each flight's line."""
+"""Points of each flight's line."""
 
 PLATE_NEAR: Final = 0.1
 """m from the edge of the incoming support to the plate, Sect. 3.2."""
 
 ABOVE: Final = 0.1
-"""m of plate above its pivot that are drawn."""
+"""m; length of plate drawn above its pivot."""
 
 FLIGHT: Final = np.dtype([("t", "f8"), ("position", "f8", 2), ("velocity", "f8", 2)])
 """A point of a flight in the world frame: time since its start, place and velocity."""
@@ -294,8 +294,8 @@ class Case:
     """One picture of a figure: its scene's name, belt speed (m/s) and plate angle (°).
 
     `ahead` is d1, m from the edge of the incoming support to the plate's pivot, at the same height;
-    `below` the plate below it, m, no more than leaves the way to the belt free. Supports have no
-    pulley, so any `radius` (m) that is left at the top will do.
+    `below` the plate below it, m, short enough to leave the way to the belt free. Supports have no
+    pulley, so any `radius` (m) will do that the particle leaves at the top.
     """
 
     name: str
@@ -323,7 +323,7 @@ CASES: Final = {
 
 
 def path(case: Case, form: Rebound) -> NDArray[Any]:
-    """Carry a mass point over the plate, with Eq. (9) in either form.
+    """Compute the path of a mass point over the plate, with Eq. (9) in either form.
 
     Returns
     -------
@@ -402,7 +402,7 @@ def trajectories(number: int) -> PaperFigure:
 
 
 def lines_of(case: Case, flights: NDArray[Any]) -> tuple[Line, ...]:
-    """Return what is drawn of a case: plate, belts and the two flights."""
+    """Return the lines of a case: plate, belts and the two flights."""
     alpha, top = np.radians(case.angle), case.radius
     along = np.array([ABOVE, -case.below])
     first, second = flights["position"]
@@ -418,7 +418,7 @@ def lines_of(case: Case, flights: NDArray[Any]) -> tuple[Line, ...]:
 
 
 def told(number: int, paths: Paths) -> dict[str, Any]:
-    """Return the values that the words of a figure take."""
+    """Return the values for the words of a figure."""
 
     def forward(flights: NDArray[Any]) -> float:
         return float(flights["velocity"][1, -1, 0])

@@ -1,12 +1,12 @@
-"""What a disk meets first, on a parabola or round a pulley, of straight and round surfaces.
+"""The first straight or round surface that a disk meets, on a parabola or round a pulley.
 
 Surfaces are segments and arcs without thickness, touched from either side at the disk's radius.
 
 The gap to each side of a face or an arc, and to each end, is a function of time (on the ride, of
 the angle) that is followed between its turning points: the disk collides at the first instant at
-which a gap falls to zero, touching included. A gap that is zero from the beginning falls if the
-disk approaches or is pressed, and not if it leaves or goes along, past an end either. Zero is what
-rounding makes of the numbers, so a graze to within rounding is one.
+which a gap falls to zero, touching included. A gap that is zero from the beginning counts as
+falling if the disk approaches or is pressed, but not if it leaves or moves along, even past an end.
+Gaps within rounding count as zero, so a graze within rounding is a contact.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ WHOLE = 2.0 * np.pi
 
 
 ROUNDING = 2.0**-48
-"""Share of the numbers that a gap is worked out from by which it may be off: 16 units of the last
+"""Error of a gap as a share of the numbers from which it is computed: 16 units of the last
 place."""
 
 
@@ -41,18 +41,18 @@ place."""
 class Obstacles:
     """Straight and round surfaces, and all their ends."""
 
-    names: tuple[str, ...]  # of the S straight ones, then of the others
+    names: tuple[str, ...]  # names of the S straight ones, then of the others
     # (S, 2): first ends of the straight ones, m, directions along them and to their left; lengths
     start: Floats
     tangent: Floats
     normal: Floats
     length: Floats
-    # (C, ...): what is round, as `Bend` has it; an end of a surface is a circle of no size
+    # (C, ...): round surfaces, as in `Bend`; an end of a surface is a circle of radius 0
     center: Floats
     size: Floats
     begin: Floats
     extent: Floats
-    owner: Ints  # to which of the names each of these belongs
+    owner: Ints  # index of the name of each of these
 
     @classmethod
     def of(cls, lines: Sequence[Line], bends: Sequence[Bend] = ()) -> Obstacles:
@@ -61,7 +61,7 @@ class Obstacles:
         way = ends[:, 1] - ends[:, 0]
         length = np.hypot(*way.T)
         tangent = way / length[:, None]
-        # Of two that are met at once the first of faces, points, rings and tips counts.
+        # Of two that are met at once, the order is faces, points, rings, tips.
         points = [(x, y, 0.0, 0.0, WHOLE, i) for k in (0, 1) for i, (x, y) in enumerate(ends[:, k])]
         rings, tips = [], []
         for i, (_, center, size, begin, extent) in enumerate(bends, start=len(lines)):
@@ -80,11 +80,11 @@ class Obstacles:
 
     @property
     def corners(self) -> Floats:
-        """Corners of boxes round all that is round, ends too, (2C, 2), m."""
+        """Corners of boxes around all round surfaces and ends, (2C, 2), m."""
         return np.concatenate([self.center - self.size[:, None], self.center + self.size[:, None]])
 
     def near(self, low: Floats, high: Floats, radius: float) -> bool:
-        """Tell whether one may be closer than a radius (m) to a box with two corners (2,)."""
+        """Whether any may be closer than a radius (m) to a box with two corners (2,)."""
         ends = self.center[: 2 * len(self.start)].reshape(2, -1, 2)
         round_, size = self.center[ends.shape[1] * 2 :], self.size[ends.shape[1] * 2 :, None]
         lower = np.concatenate([ends.min(axis=0), round_ - size])
@@ -93,12 +93,12 @@ class Obstacles:
         return bool(((lower - room <= high) & (upper + room >= low)).all(axis=1).any())
 
     def on_face(self, points: Floats) -> Bools:
-        """Tell whether the feet of points (S, 2) are on the straight surfaces."""
+        """Whether the nearest points to points (S, 2) are on the straight surfaces."""
         foot = np.sum((points - self.start) * self.tangent, axis=1)
         return np.asarray((foot >= 0.0) & (foot <= self.length))
 
     def on_arc(self, points: Floats) -> Bools:
-        """Tell whether the directions from the centres to points (C, 2) are on the arcs."""
+        """Whether the directions from the centres to points (C, 2) are on the arcs."""
         away = points - self.center
         turned = np.arctan2(away[:, 1], away[:, 0]) - self.begin
         return np.asarray(np.mod(turned, WHOLE) <= self.extent)
@@ -152,10 +152,10 @@ class Flight:
 def ring_times(
     flight: Flight, center: Floats, size: float, radius: float, horizon: float, side: float = 1.0
 ) -> Iterator[float]:
-    """Yield when a disk comes to a circle of a size (m) from outside, or inside (-1.0), in order.
+    """Yield the times when a disk reaches a circle from outside, or inside (-1.0), in order.
 
-    The distance, squared, is a quartic. Between the roots of its derivative it is monotone, so no
-    approach is overlooked, and none found that is not there.
+    The squared distance is a quartic. Between the roots of its derivative it is monotone, so every
+    approach is found, and no false one.
     """
     drop, v = np.array([0.0, -0.5 * flight.gravity]), flight.velocity
     apart, far = flight.position - center, size + side * radius
@@ -172,7 +172,7 @@ def ring_times(
     for index in np.flatnonzero((values[:-1] >= 0.0) & (values[1:] <= 0.0)):
         low, high = marks[index : index + 2]
         if values[index] == 0.0:
-            # Where the gap is zero first, the fall begins there, if it is one.
+            # If the gap is zero at the beginning, it may begin to fall there.
             if values[index + 1] < 0.0:
                 yield float(low)
             continue
@@ -202,7 +202,7 @@ def first_in_flight(
     faces, rings = np.full(len(start), np.inf), np.full(len(size), np.inf)
     off = ROUNDING * (np.abs(flight.position).sum() + np.abs(start).sum(axis=1) + radius)
     for side in (1.0, -1.0):
-        # Where c + b t + a t² falls to 0, without cancellation; NaN if nowhere.
+        # Time at which c + b t + a t² falls to 0, without cancellation; NaN if never.
         c, b, a = side * height - radius, side * speed, side * bend
         c[np.abs(c) <= off] = 0.0
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -213,7 +213,7 @@ def first_in_flight(
         met = (t >= 0.0) & (t <= horizon)
         met &= obstacles.on_face(flight.at(np.where(met, t, 0.0)))
         faces = np.minimum(faces, np.where(met, t, np.inf))
-    # Circles that the box of the flight comes near.
+    # Circles near the bounding box of the flight.
     room = 1.001 * (size + radius)[:, None]
     near = (center >= low - room) & (center <= high + room)
     along &= np.abs(np.abs(height) - radius) <= off
@@ -241,7 +241,7 @@ def first_on_pulley(
         return np.inf, -1
 
     def turned(lean: Floats, cosine: Floats, on_it: Callable[[Floats], Bools]) -> Floats:
-        """Return how far from `begin` it is to the first of the angles lean ± acos; inf if none."""
+        """Return the angle from `begin` to the first of the angles lean ± acos; inf if none."""
         # A cosine may be beyond 1 by rounding.
         over = np.abs(cosine) - 1.0
         spread = np.arccos(np.where(np.abs(over) <= ROUNDING, np.sign(cosine), cosine))

@@ -1,4 +1,4 @@
-"""The paper's Tables 1, 3, 4 and 5, as printed, beside what the equations give, cell by cell."""
+"""The paper's Tables 1, 3, 4 and 5 as printed, beside computed values, cell by cell."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from chutelab.util.tables import Sheet, Shown
 PRINTED: dict[str, Any] = tomllib.loads(
     (Path(__file__).parent / "paper.toml").read_text(encoding="utf-8")
 )
-"""The paper's numbers as texts, with all their digits; the file says what they are."""
+"""The paper's numbers as texts, with all their digits; explained in the file."""
 
 WORDS: dict[str, Any] = PRINTED["words"]
-"""What is said of tables and figures, with names of computed values in braces."""
+"""Texts on tables and figures, with names of computed values in braces."""
 
 RADII: list[str] = PRINTED["radii"]
 DISTANCES: list[str] = PRINTED["distances"]
@@ -30,7 +30,8 @@ TABLES = (1, 3, 4, 5)
 """Numbers of the tables that hold results (Table 2 lists the simulated model's dimensions)."""
 
 SLACK = Decimal("1e-9")
-"""Of half a unit of the last digit: a tie such as 0.6575 for 0.658 is one in decimal only."""
+"""Relative tolerance on half a unit of the last digit: a tie such as 0.6575 for 0.658 is a tie only
+in decimal."""
 
 BALL_MASS = 0.26
 """kg, the steel ball of Table 2 (20 mm radius at 7.8e-6 kg/mm³)."""
@@ -44,7 +45,7 @@ FALL = 0.5
 
 @dataclass(frozen=True)
 class Cell:
-    """One number of a table, as the paper has it and as the equations give it, in the same unit.
+    """One number of a table, as printed and as computed, in the same unit.
 
     `rounded` is the computed one with the printed number of decimals, halves away from zero. It
     differs if the two are more than half a unit of the last printed digit apart; ties agree.
@@ -84,7 +85,7 @@ class Table(Shown):
     rows : tuple of Row
         A row per pulley radius; Table 1 has its two speeds one after the other.
     notes : tuple of str
-        What to know before drawing conclusions from the differences.
+        Remarks on the differences.
     """
 
     number: int
@@ -109,7 +110,7 @@ class Table(Shown):
         form = self.rebound.replace("-", " ")
         return Sheet(
             f"{self.title}\n(printed, computed with Eq. (9) {form})",
-            # Broken here, or the terminal breaks some of them elsewhere.
+            # Lines are broken here, as the terminal would break some of them elsewhere.
             tuple(column.replace(" = ", " =\n") for column in self.columns),
             tuple((row.label, *map(str, row.cells)) for row in self.rows),
             notes=(
@@ -127,8 +128,8 @@ def table(number: int, rebound: Rebound = "as-printed") -> Table:
     number : {1, 3, 4, 5}
         Which table.
     rebound : {"corrected", "as-printed"}
-        Which Eq. (9) the computed numbers follow; it matters to x3 of Table 1 and to the landing
-        in Table 3 only.
+        Form of Eq. (9) for the computed numbers; it matters only for x3 of Table 1 and the landing
+        in Table 3.
 
     Returns
     -------
@@ -163,7 +164,7 @@ def compared(label: str, printed: Sequence[str], computed: Sequence[float]) -> R
 
 
 def at_radii(radii: Floats, speed: float, distance: float, rebound: Rebound) -> Transfer:
-    """Carry a point of 8 g over an upright plate with ε = 0.5, from pulleys of these radii (m)."""
+    """Compute the transfer of an 8 g point over an upright plate, ε = 0.5, by radius (m)."""
     return transfer(
         speed=speed, pulley_radius=radii, distance=distance, restitution=0.5, drop=FALL,
         mass=0.008, gravity=9.81, rebound=rebound,
@@ -213,7 +214,7 @@ def energies(number: int, rebound: Rebound) -> Table:
     """Table 3 for the paper's own simulated model: flat supports, so that φ1 = 0 and d1 = 0.5 m."""
     rows = []
     for speed, printed in PRINTED["energies"].items():
-        radius = 0.1  # any pulley that is left at the top will do
+        radius = 0.1  # any pulley that the particle leaves at the top will do
         found = transfer(
             speed=float(speed),
             pulley_radius=radius,

@@ -1,7 +1,7 @@
 """`predict`: the theory's answer for a scene, or the reason why it has none.
 
-The finite machine is laid over the numbers of `transfer`: what is touched before the plate, whether
-the plate is there, what is touched between rebound and landing, whether the belt is there.
+The finite machine is compared with the numbers of `transfer`: what is touched before the plate,
+whether the plate is hit, what is touched between rebound and landing, whether the belt is hit.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from chutelab.theory.transfer import Rebound, Transfer, cut, transfer, unanswere
 from chutelab.util.arrays import RADIANS, hypot, sin_cos
 
 if TYPE_CHECKING:
-    # The paper's tables are there without the model of a scene.
+    # The paper's tables do not need the model of a scene.
     from chutelab.scene import AnyScene, Scene
     from chutelab.scene.variants import Family
 
 
 class Course:
-    """Particle 0 on its way through one scene that has an incoming belt and a plate.
+    """The path of particle 0 through a scene with an incoming belt and a plate.
 
-    `found` is what the equations say about unbounded plate and belt, 0-d. Places and lengths are
-    world coordinates, m.
+    `found` has the results of the equations for unbounded plate and belt, 0-d. Places are in world
+    coordinates, m.
     """
 
     def __init__(self, scene: Scene, found: Transfer) -> None:
@@ -66,7 +66,7 @@ class Course:
         away, down = (found.v2r * part for part in sin_cos(float(found.phi2r)))
         self.rebounded = Flight(self.impact, away * self.normal - down * self.up, scene.gravity)
 
-        # None if there is no outgoing belt, or nothing to measure its height from.
+        # None if there is no outgoing belt, or no reference for its height.
         self.belt_height: float | None = None
         if out is not None and out.drop_from == "top":
             self.belt_height = self.belt.pulley_radius - out.drop
@@ -94,7 +94,7 @@ class Course:
         self.belt_line: Line = "incoming", end - self.belt.length * self.along, end
 
     def meets(self, claim: Reason, name: str, how: str) -> str:
-        """Return the reason for which the equations end at a surface."""
+        """Return the reason why the equations end at a surface."""
         for free in self.scene.surface:
             if free.name == name and (free.opens_at, free.closes_at) != (None, None):
                 claim, how = Reason.OUTSIDE, "it is a gate, and in the way while it is shut"
@@ -148,19 +148,19 @@ def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     Returns
     -------
     Transfer
-        0-d arrays. NaN from the stage on that is not reached as the equations assume, with a
-        `reason`: see `chutelab.theory.Reason` for what each claims. ``P`` takes 1 / stream.rate for
-        the time per particle. ``belt_work`` and ``slip_heat`` are what the outgoing belt pays once
-        the particle no longer slips on it.
+        0-d arrays. NaN from the first stage on that is not reached as the equations assume, with a
+        `reason`: see `chutelab.theory.Reason` for the meaning of each. ``P`` takes 1 / stream.rate
+        for the time per particle. ``belt_work`` and ``slip_heat`` are those of the outgoing belt
+        until the particle no longer slips.
 
     Notes
     -----
-    It is the first particle of the first stream. Surface names in reasons are the scene's own, with
-    ``plate``, ``outgoing``, ``incoming`` (the belt's straight part) and ``pulley``. A gate in the
-    way ends the answer, shut or open. What happens after the landing is not looked at. Contacts
-    that graze to within rounding may be judged either way.
+    Particle 0 is the first particle of the first stream. Surface names in reasons are the scene's
+    own, with ``plate``, ``outgoing``, ``incoming`` (the belt's straight part) and ``pulley``. A
+    gate in the way ends the answer, shut or open. The motion after the landing is not considered.
+    Contacts that graze within rounding may be judged either way.
     """
-    # Here, because the equations alone need no scene files, and none of Pydantic.
+    # Imported here, because the equations alone need neither scene files nor Pydantic.
     from chutelab.scene import load
 
     scene = load(scene)
@@ -171,17 +171,17 @@ def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
         return found
     course = Course(scene, found)
     if scene.outgoing is not None and course.belt_height is None:
-        # Nothing places the belt, nor the plate's lower end: there is no machine to look at.
+        # The belt and the plate's lower end have no place, so there is no machine to compare with.
         return cut(found, "separation", str(found.reason))
     return cut(found, *trouble) if (trouble := hindrance(course)) else found
 
 
 def unbounded(scenes: Scene | Family, rebound: Rebound = "corrected") -> Transfer:
-    """Return what the equations say of a scene if nothing else were in the way.
+    """Return the results of the equations for a scene if nothing else were in the way.
 
-    Plate and outgoing belt are without ends, the pulley is met no more, and what the scene says of
-    releases is not looked at. The scene has an incoming conveyor and a plate; the arrays are 0-d,
-    those of a family of such scenes (see `chutelab.scene.variants.Family`) are (N,).
+    Plate and outgoing belt have no ends, the pulley is not met again, and the scene's releases are
+    not considered. The scene must have an incoming conveyor and a plate; the arrays are 0-d, those
+    of a family of such scenes (see `chutelab.scene.variants.Family`) are (N,).
     """
     value, scene = scenes.value, scenes.scene
     belt, plate, out = scene.incoming, scene.plate, scene.outgoing
@@ -219,7 +219,7 @@ def unbounded(scenes: Scene | Family, rebound: Rebound = "corrected") -> Transfe
 
 
 def ride_of(scenes: Scene | Family) -> dict[str, Any]:
-    """Return what `transfer` takes, as numbers, of particle 0's ride on the incoming conveyor."""
+    """Return the arguments of `transfer` for particle 0's ride on the incoming conveyor."""
     value, scene = scenes.value, scenes.scene
     belt, own, at = scene.incoming, scene.particle, value(scene.stream, "at")
     assert belt is not None
@@ -242,9 +242,9 @@ def ride_of(scenes: Scene | Family) -> dict[str, Any]:
 
 
 def not_carried(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
-    """Yield what tells that particle 0 is not released on the incoming belt, at its speed.
+    """Yield the reasons why particle 0 is not released on the incoming belt at its speed.
 
-    Conditions, of a family (N,) or one for all, and what to say.
+    They are conditions, in a family (N,) or one for all, with their words.
     """
     value, belt, stream = scenes.value, scenes.scene.incoming, scenes.scene.stream
     assert belt is not None
@@ -265,7 +265,7 @@ def not_carried(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
 
 
 def outside(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
-    """Yield what makes the scene another problem than the paper's, as `not_carried` does."""
+    """Yield reasons why the scene is another problem than the paper's, like `not_carried`."""
     scene, own = scenes.scene, scenes.scene.particle
     yield scene.incoming is None, "there is no incoming conveyor"
     yield scene.plate is None, "there is no damping plate"
@@ -287,9 +287,9 @@ def outside(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
 
 
 def hindrance(course: Course) -> tuple[str, str] | None:
-    """Return the first stage that is not reached as the equations assume, and why; None if all are.
+    """Return the first stage that is not reached as assumed, and why; None if all are.
 
-    What is in the way is looked for along the ride, the flight to the plate, and the fall from it.
+    Obstacles are searched along the ride, the flight to the plate, and the fall from it.
     """
     found, radius, out = course.found, course.radius, course.scene.outgoing
     low, high = course.plate_reach
@@ -317,8 +317,8 @@ def hindrance(course: Course) -> tuple[str, str] | None:
     obstacles = Obstacles.of(course.lines[1:] if hit else course.lines, course.bends)
     plate = obstacles if hit else Obstacles.of(course.lines[:1])
     horizon = float(found.t2) if hit else flight.horizon(plate, radius)
-    # Thrown up slowly, it may come down on the pulley again. Faster, it would only seem to at once,
-    # by rounding: it starts on the circle.
+    # Thrown up slowly, it may come down on the pulley again. Otherwise the pulley is not checked,
+    # as the flight starts on the circle and would seem to meet it by rounding.
     again = np.inf
     slow = found.v1 * found.v1 * sin_cos(found.phi1)[1] < flight.gravity * course.ride_radius
     if found.phi1 < 0.0 and slow:
@@ -353,7 +353,7 @@ def hindrance(course: Course) -> tuple[str, str] | None:
         return "landing", Reason.MISSES.because("the plate is met below the belt")
     lands, flight = bool(np.isfinite(found.t3)), course.rebounded
     pulley: Bend = ("pulley", (0.0, 0.0), course.belt.pulley_radius, 0.0, WHOLE)
-    # The outgoing belt is not among them: no part of it, ends included, is met above its level.
+    # The outgoing belt is left out: no part of it, ends included, is met above its level.
     bends = [*course.bends, pulley]
     if lands:
         horizon = float(found.t3)
@@ -361,7 +361,8 @@ def hindrance(course: Course) -> tuple[str, str] | None:
         horizon = flight.horizon(Obstacles.of(course.lines, bends), radius)
     again, pressing = np.inf, -flight.gravity * sin_cos(course.angle)[0]
     if pressing > 0.0:
-        # Gravity takes it back to a plate that leans away: to its face, where it is now, or an end.
+        # Gravity brings it back to a plate that leans away: to its face, where it is now, or an
+        # end.
         bends += [("plate", end, 0.0, 0.0, WHOLE) for end in course.lines[0][1:]]
         back = 2.0 * float(flight.velocity @ course.normal) / pressing
         foot = float((flight.at(np.array(back)) - course.pivot) @ course.up)
@@ -380,11 +381,11 @@ def hindrance(course: Course) -> tuple[str, str] | None:
 
 @dataclass(frozen=True)
 class Coverage:
-    """What the closed form has to say of a scene."""
+    """Which quantities of a scene the closed form has."""
 
     covers: tuple[str, ...]  # the paper's symbols that it gives
     leaves_out: tuple[str, ...]  # and those that it does not
-    reason: str  # why it stops, as `chutelab.theory` has it; "" if it does not
+    reason: str  # why it stops, a reason of `chutelab.theory`; "" if it does not
     words: str  # the same for people
 
 
@@ -395,11 +396,11 @@ WORDS = {
     Reason.SECOND: "After the plate it meets something else before it lands",
     Reason.MISSES: "It does not come down on the outgoing belt",
 }
-"""What a reason means, in words for a first look at the scene."""
+"""Meaning of a reason, in words for ``check``."""
 
 
 def coverage(scene: Scene) -> Coverage:
-    """Ask the theory about a scene; it speaks of particle 0."""
+    """Find which quantities of particle 0 the theory has for a scene."""
     from chutelab.scene.quantities import THEORY
 
     found, lone = predict(scene), scene.count == 1

@@ -1,12 +1,12 @@
 """Sliding and rolling on a round surface in closed form: a chute, and the top of a pulley.
 
 With u = v² / (g ρ), ρ the radius of the centre's path, and θ the angle from the x axis round the
-arc's centre, the surface presses with m g n, n = u - sin θ from inside and sin θ - u from outside.
-Friction makes that a linear equation for n over the angle.
+arc's centre, the normal force is m g n, n = u - sin θ from inside and sin θ - u from outside. With
+friction this is a linear differential equation for n over the angle.
 
 `slide` follows a motion along a chute at rest. `separation` follows the ride round the drive
 pulley, with φ the angle from its top: a belt that rises at β meets it at φ = -β; the particle may
-slip back at first, then holds or rolls, then slips forward, and leaves where n = 0.
+slip backwards at first, then grips or rolls, then slips forwards, and leaves where n = 0.
 """
 
 from __future__ import annotations
@@ -20,23 +20,22 @@ from numpy.typing import ArrayLike, NDArray
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers, arc_cos, sin_cos
 
 HALVINGS = 64
-"""Bisections of an angle: they exhaust a double's digits."""
+"""Bisections of an angle, enough for all digits of a double."""
 
 LEAST = 1e-18
 """rad; a shorter motion is rounding: the body does not move."""
 
 LARGEST = 700.0
-"""Largest exponent; by then the body has left the surface, or come to rest."""
+"""Largest exponent; before it is reached the body has left the surface, or come to rest."""
 
 
 class Reason(StrEnum):
     """First words of every non-empty `Transfer.reason`, up to its colon.
 
-    What a reason claims, so that a simulation can confirm it:
+    The statement of each reason, which a simulation can confirm:
 
     OUTSIDE
-        A parameter or the scene is not what the equations describe. Claims nothing about the
-        motion.
+        The equations do not describe this parameter or scene. It says nothing about the motion.
     EARLY
         The named surface is touched during the ride or in the first flight, and that contact is not
         the impact on the struck face of the plate. It is the first one after the release.
@@ -81,7 +80,7 @@ class Reason(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Arrays:
-    """An answer of read-only arrays, copies of what it is made of."""
+    """A result of read-only arrays, copied on entry."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -91,7 +90,7 @@ class Arrays:
 
 
 class Answers:
-    """Results of N motions, stage by stage, and the reason where they end."""
+    """Results of N motions, stage by stage, and the reasons where they end."""
 
     def __init__(self, count: int) -> None:
         self.values: dict[str, Floats] = {}
@@ -99,19 +98,19 @@ class Answers:
         self.fine = np.full(count, True)
 
     def fail(self, where: Bools, reason: str) -> None:
-        """State a reason where there is none yet."""
+        """Set a reason where there is none yet."""
         if where.any():
             self.reason[where & self.fine] = reason
             self.fine &= ~where
 
     def require(self, rules: dict[str, Bools]) -> None:
-        """Object to parameters that break a rule; NaN never holds."""
+        """Set a reason for parameters that break a rule; NaN breaks every rule."""
         for rule, holds in rules.items():
             if not holds.all():
                 self.fail(~holds, Reason.OUTSIDE.because(f"{rule} is required"))
 
     def keep(self, **values: Floats) -> None:
-        """Store results of a stage where nothing has gone wrong up to now."""
+        """Store results of a stage for motions without a reason so far."""
         self.values |= {name: np.where(self.fine, v, np.nan) for name, v in values.items()}
 
 
@@ -121,19 +120,19 @@ _NODES = tuple(
     zip(_share, _share[::-1], np.pi / 16.0 * np.cosh(_x) * _share * _share[::-1], strict=True)
 )
 """Double exponential quadrature of the time: shares of a piece from its two ends, and weights. It
-takes 1/√u where u is 0 at an end; the last nodes are 1e-37 from there."""
+handles 1/√u with u = 0 at an end; the last nodes are 1e-37 from there."""
 
 
 class Leg:
-    """Motion under one law from an angle on: where it ends, and how; arrays (N,).
+    """Motion under one law from an angle on: its end and the reason for it; arrays (N,).
 
     Angles x >= 0 are counted from `start` in the direction of motion. With σ = 1 counter-clockwise
     and -1 clockwise, s = 1 inside and -1 outside, b = 2 µ s,
 
         n = A sin θ + B cos θ + C exp(-b x), A = -3 s/(1 + b²), B = σ b A.
 
-    A body that rolls, k = I/(m r²), has b = 0 and 1 + 2/(1 + k) for the 3, as long as friction
-    bears its share of the weight: k/(1 + k) |cos θ| <= µ n. Endless k is a body that is carried at
+    A body that rolls, k = I/(m r²), has b = 0 and 1 + 2/(1 + k) instead of 3, as long as friction
+    carries its share of the weight: k/(1 + k) |cos θ| <= µ n. Infinite k is a body carried at
     constant speed.
 
     Parameters
@@ -143,20 +142,20 @@ class Leg:
     way : ndarray
         Largest x, rad.
     sense, side, friction : ndarray
-        σ, s and µ; -µ where the surface moves on faster than the body that slides on it.
+        σ, s and µ; -µ if the surface is faster than the body that slides on it.
     rolls : ndarray of bool
         Whether it rolls, or is carried.
     inertia : ndarray
-        k of one that does.
+        k of a body that rolls.
     limit : ndarray
-        u with which one that is sped up by the surface is as fast as that.
+        u at which a body that the surface accelerates has the surface's speed.
 
     Attributes
     ----------
     end, u, gained, load : ndarray
         x, u, its growth and n at the end.
     why : ndarray of str
-        "stops", "lifts off", "slips" or "holds" (it is as fast as the surface); "" at `way`.
+        "stops", "lifts off", "slips" or "holds" (it has the surface's speed); "" at `way`.
     """
 
     def __init__(
@@ -187,14 +186,14 @@ class Leg:
             fast = (there >= limit) & (-sense * across > friction * pressed)
             return there <= 0.0, pressed < 0.0, rolls & grip, fast
 
-        # u exp(b x), n exp(b x) and what is left of the grip of a body that rolls rise or fall all
-        # the way from one of these angles to the next.
+        # u exp(b x), n exp(b x) and the margin of the grip of a rolling body are monotone between
+        # these angles.
         least = np.arctan2(friction * (1.0 + 2.0 * gives), 1.0 - gives)
         turns = [place + 0.5 * np.pi, np.arctan2(sense, friction * side), least, -least]
         first = np.mod(sense * (np.stack(turns) - start), np.pi)
         self.marks = np.concatenate([place[None], first, first + np.pi, way[None]])
         self.marks = np.sort(np.minimum(self.marks, way), axis=0)
-        # The first of the pieces in whose course something is lost, then where.
+        # The first piece in which one of them falls to 0, then the place.
         gone = np.array([(mark > 0.0) & np.any(lost(mark), axis=0) for mark in self.marks[1:]])
         index = np.argmax(gone, axis=0)[None]
         low, high = (np.take_along_axis(part, index, axis=0)[0]
@@ -212,13 +211,13 @@ class Leg:
         self.u, self.load = self.ahead(place, u, load, self.end)
         self.u = np.where(stops, 0.0, self.u)
         self.gained = self.ahead(place, place, load, self.end)[0]
-        # At the onset of slip friction tells the load better than a difference does.
+        # At the onset of slip friction gives the load more accurately than a difference.
         bears = (1.0 - gives) * np.abs(np.cos(start + sense * self.end))
         self.load = np.where(slips & ~at_once, bears / friction, self.load)
         self._states = np.stack(self.ahead(place, u, load, self.marks))
 
     def ahead(self, x: Floats, u: Floats, load: Floats, step: Floats) -> tuple[Floats, Floats]:
-        """Return u and n a step on from x, where they are known; small differences are exact."""
+        """Return u and n a step beyond x, where they are known; small differences are exact."""
         theta, half = self.start + self.sense * x, 0.5 * self.sense * step
         sine = 2.0 * np.sin(half) * np.cos(theta + half)
         cosine = -2.0 * np.sin(half) * np.sin(theta + half)
@@ -237,7 +236,7 @@ class Leg:
         length = length[pieces]
         time, pressed = np.zeros((2, *self.end.shape))
         for share, rest, weight in _NODES:
-            # From the nearer end of the piece.
+            # Measured from the nearer end of the piece.
             near = pieces + (share > 0.5)
             step = length * (-rest if share > 0.5 else share)
             u, load = states[:, near]
@@ -251,12 +250,12 @@ class Leg:
 
 @dataclass(frozen=True, eq=False)
 class Slide(Arrays):
-    """Where and how motions along a round chute end: read-only arrays of one shape.
+    """Ends of motions along a round chute: read-only arrays of one shape.
 
     Attributes
     ----------
     angle : ndarray
-        Angle that is reached, rad: the `end` that was asked for, unless `reason` says otherwise.
+        Angle reached, rad: the `end` asked for, unless there is a `reason`.
     speed, omega : ndarray
         Speed there, m/s, and angular velocity, counter-clockwise, rad/s.
     time : ndarray
@@ -264,9 +263,9 @@ class Slide(Arrays):
     load : ndarray
         Normal force there over the weight.
     reason : ndarray of str
-        Empty where the end is reached. "stops" and "lifts off" tell what happens at `angle`;
-        "slips", that a body that rolls inside the chute loses its grip there, from where on there
-        is no closed form. "outside the model: ..." goes with NaN.
+        Empty where the end is reached. "stops" and "lifts off" name the event at `angle`; "slips"
+        means that a body rolling inside the chute loses its grip there, after which there is no
+        closed form. "outside the model: ..." goes with NaN.
     """
 
     angle: Floats
@@ -304,14 +303,14 @@ def slide(
     friction : array_like
         Coulomb's µ, finite.
     inside : array_like of bool
-        True: in the hollow of the arc. False: on its back, until it lifts off.
+        True: inside the arc. False: outside, until it lifts off.
     particle_radius : array_like
-        r >= 0, m; inside it is smaller than the arc's.
+        r >= 0, m; inside it must be smaller than the arc's.
     spin : array_like of bool
-        True: a body that turns freely. It rolls at the start, and as long as µ holds it; on the
-        back of an arc it slips after that, with the spin it has.
+        True: a body that rotates freely. It rolls at the start, as long as µ suffices; outside an
+        arc it slips after that, with the spin that it has.
     inertia : array_like
-        I/(m r²) of one that does, 0 < I/(m r²) <= 1: 1/2 of a disk, 2/5 of a sphere.
+        I/(m r²) if it rotates, 0 < I/(m r²) <= 1: 1/2 of a disk, 2/5 of a sphere.
     gravity : array_like
         g > 0, m/s².
 
@@ -323,11 +322,11 @@ def slide(
     Notes
     -----
     A body that slides has du/dθ = -2 cos θ - a (u - sin θ), a = 2 µ inside and counter-clockwise,
-    with the sign changed once for the back and once for clockwise. The solution is
-    u = [(a² - 2) sin θ - 3 a cos θ]/(1 + a²) + C exp(-a θ). For a chute see A. W. Roberts, An
-    investigation of the gravity flow of noncohesive granular materials through discharge chutes,
-    J. Eng. Ind. 91, 373-381, 1969. One that rolls has u = u0 - 2/(1 + k) (sin θ - sin θ0),
-    k = I/(m r²), while `k/(1 + k) |cos θ| <= µ n`. The time is a quadrature, to about 1e-13.
+    with the sign changed once for outside and once for clockwise. The solution is u = [(a² - 2) sin
+    θ - 3 a cos θ]/(1 + a²) + C exp(-a θ). For a chute see A. W. Roberts, An investigation of the
+    gravity flow of noncohesive granular materials through discharge chutes, J. Eng. Ind. 91,
+    373-381, 1969. One that rolls has u = u0 - 2/(1 + k) (sin θ - sin θ0), k = I/(m r²), while `k/(1
+    + k) |cos θ| <= µ n`. The time is a quadrature, to about 1e-13.
 
     Examples
     --------
@@ -398,7 +397,7 @@ def slide(
 
 
 MOST_FRICTION = 1e100
-"""Its square does not overflow, and slip at it cannot be told from slip at infinite friction."""
+"""Its square does not overflow, and slip is the same as with infinite friction."""
 
 FAULTS = (
     "",
@@ -406,18 +405,18 @@ FAULTS = (
     "it does not get over the pulley",
     "it slips back on the pulley, which has no closed form for a body that turns",
 )
-"""Why there is no separation, by `Separation.fault`; all on belts that rise."""
+"""Why there is no separation, by `Separation.fault`; all occur on rising belts."""
 
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """State of the centre where the pulley is left, arrays of one shape.
+    """State of the centre at the separation from the pulley, arrays of one shape.
 
-    φ1 is the angle from the top of the pulley, rad, its cosine and sine are each to full relative
-    precision; v1 is the speed, m/s, and `rim` is r ω, m/s, ω counter-clockwise: the velocity of the
-    lowest point relative to the centre. Thrown up from a rising belt, it may come down on the
-    pulley again after the time `again`, s, inf if not. `fault` is an index into `FAULTS`, and
-    where it is not 0 all else is NaN.
+    φ1 is the angle from the top of the pulley, rad; its cosine and sine have full relative
+    precision. v1 is the speed, m/s, and `rim` is r ω, m/s, ω counter-clockwise: the velocity of the
+    lowest point relative to the centre. Thrown up from a rising belt, the particle may come down on
+    the pulley again after the time `again`, s, inf if not. `fault` is an index into `FAULTS`; if it
+    is not 0, all else is NaN.
     """
 
     phi1: Floats
@@ -440,15 +439,15 @@ def separation(
     incline: ArrayLike = 0.0,
     ride_length: ArrayLike = 0.0,
 ) -> Separation:
-    """Separate from the pulley after a ride that starts on the belt, with its speed and no spin.
+    """Return the separation after a ride that starts on the belt at its speed without spin.
 
     All are (N,), or numbers where there is a default: v0 (m/s), Rc (m), g (m/s²), µ of belt and
-    pulley, whether it turns, and I/(m r²) then; the angle β at which the belt rises (rad), and the
-    way on it before it meets the pulley (m), which matters where it slides or rolls on an incline.
-    Infinite µ is adhesion: carried at v0, not turning, Eq. (2).
+    pulley, whether the particle rotates, and then I/(m r²); the angle β at which the belt rises
+    (rad), and the distance on it up to the pulley (m), which matters if the particle slides or
+    rolls on an incline. Infinite µ is adhesion: carried at v0 without rotation, Eq. (2).
 
-    Adhesion is a closed form; slip is one over the angle, of which onset and end are bisected to
-    the last bit or two. The spin of a slipping disk is a quadrature, to about 1e-14.
+    Adhesion has a closed form; slip has one over the angle, whose onset and end are bisected to the
+    last bit or two. The spin of a slipping disk is a quadrature, to about 1e-14.
     """
     count, endless = len(speed), np.isinf(friction)
     k, beta, way = (
@@ -459,23 +458,24 @@ def separation(
     (sin, cos), rises, begin = sin_cos(beta), beta > 0.0, 0.0 - beta
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         unit = gravity * ride_radius  # v² at u = 1
-        # On the belt. Held, friction bears this share of the weight; the rest accelerates.
+        # On the belt. With grip, friction carries this share of the weight; the rest accelerates.
         share = np.where(turns, k / (1.0 + k), 1.0)
         slides = ~endless & (np.abs(sin) * share > friction * cos)
         pull = np.where(slides, sin - np.sign(sin) * friction * cos, (1.0 - share) * sin)
         square = speed**2 - 2.0 * gravity * pull * way
         arrives = square > 0.0
         v = np.where(pull == 0.0, speed, np.sqrt(np.where(arrives, square, np.nan)))
-        # Rolling, the rim makes up for the speed; sliding, friction turns it at its own rate.
+        # When rolling, the rim compensates the speed; when sliding, friction changes the spin at
+        # its own rate.
         rate = np.where(slides, np.sign(sin) * friction * cos / k, pull)
         rim = np.where(turns, rate * 2.0 * gravity * way / (speed + v), 0.0)
         belt, u = speed**2 / unit, v**2 / unit
-        # A flight that begins where the belt ends may come down on the pulley.
+        # A flight that begins at the end of the belt may come down on the pulley.
         lifts = u >= cos
         up = gravity * (v * sin + np.sqrt(np.maximum(cos * (unit - v**2 * cos), 0.0)))
         hops = lifts & rises & (v**2 * cos < unit)
         again = np.where(hops, 2.0 * (v**2 - unit * cos) / up, np.inf)
-    # On the pulley the load is less: it may slip at once, forward or back.
+    # On the pulley the normal force is smaller, so it may slip at once, forwards or backwards.
     forward = ~lifts & ~rises & slides
     back = ~lifts & rises & (slides | (~endless & (sin * share > friction * (cos - u))))
     fault = np.where(arrives, np.where(turns & back, 3, 0), 1)
@@ -484,7 +484,7 @@ def separation(
     angle, load = begin.copy(), cos - u
 
     def leg(which: Bools, grip: Floats, inertia: Floats, limit: Numbers, *, rolls: bool) -> Leg:
-        """Take some of them on over the pulley, clockwise on its back, at most to φ = π/2."""
+        """Continue some of them over the pulley, clockwise outside of it, at most to φ = π/2."""
         on = np.full((3, int(which.sum())), -1.0)
         part = Leg(
             0.5 * np.pi - angle[which], u[which], load[which], 0.5 * np.pi - angle[which],
@@ -518,7 +518,7 @@ def separation(
         phi1 = np.where(sound, np.where(rides, angle, phi1), np.nan)
         sin, cos = sin_cos(phi1)
         v = np.where(sound, np.where(rides, np.sqrt(unit * cos), v), np.nan)
-    # Level and without slip the cosine is known better than the angle.
+    # On a level belt without slip the cosine is known more accurately than the angle.
     level = ~rides & (beta == 0.0)
     cos = np.where(level, np.minimum(belt, 1.0), cos)
     sin = np.where(level, np.sqrt((1.0 - cos) * (1.0 + cos)), sin)

@@ -1,7 +1,7 @@
 """The paper's equations (2) to (16) in closed form, vectorised, with their generalisations.
 
-Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside the right one.
-`belt_power` is of a steady stream.
+Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside the correct one.
+`belt_power` is for a steady stream.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Transfer(Arrays):
     """One transfer from belt to belt, or many: read-only arrays of one shape, SI units, radians.
 
     NaN where there is no answer; `reason` then says why, see `chutelab.theory.Reason`. Stages
-    that were reached before the trouble keep their values.
+    before that keep their values.
 
     Attributes
     ----------
@@ -51,10 +51,9 @@ class Transfer(Arrays):
     dEk, P : ndarray
         Energy (J) and power (W) as the paper has them, Eqs. (14), (15). The sign of v3x is lost.
     belt_work, slip_heat : ndarray
-        What the outgoing belt's drive pays until the particle no longer slips, and the part of it
-        that becomes heat, J.
+        Work of the outgoing belt's drive until the particle no longer slips, and the heat, J.
     reason : ndarray of str
-        Empty where all is well.
+        Empty if there is none.
     """
 
     phi1: Floats
@@ -94,13 +93,13 @@ STAGES = {
 
 
 def unanswered() -> Transfer:
-    """Return a 0-d transfer that is NaN throughout, with no reason yet."""
+    """Return a 0-d transfer that is all NaN, with no reason yet."""
     names = [name for stage in STAGES.values() for name in stage]
     return Transfer(reason=np.array(""), **dict.fromkeys(names, np.array(np.nan)))
 
 
 def cut(found: Transfer, stage: str, reason: str) -> Transfer:
-    """Return a 0-d transfer without a stage and all later ones, and say why."""
+    """Return a 0-d transfer without a stage and all later ones, with the reason."""
     order = list(STAGES)
     lost = [name for later in order[order.index(stage) :] for name in STAGES[later]]
     return replace(found, reason=np.array(reason), **dict.fromkeys(lost, np.array(np.nan)))
@@ -130,7 +129,7 @@ def transfer(
     rebound: Rebound = "corrected",
     unbounded_plate: bool = True,
 ) -> Transfer:
-    """Carry a particle from the incoming belt over the plate to the outgoing belt.
+    """Compute the transfer of a particle over the plate to the outgoing belt.
 
     Plate and outgoing belt are unbounded here, and after the rebound neither pulley nor incoming
     belt are in the way; `chutelab.theory.predict` takes the finite machine into account.
@@ -158,21 +157,21 @@ def transfer(
     friction : array_like
         µ of particle and incoming belt or pulley; infinite is adhesion, Eq. (1).
     spin : array_like of bool
-        True: a body that turns freely, such as a disk; needs r > 0.
+        True: a body that rotates freely, such as a disk; needs r > 0.
     inertia : array_like
-        I/(m r²) of one that does, 0 < I/(m r²) <= 1: 1/2 of a disk, 2/5 of a sphere.
+        I/(m r²) if it rotates, 0 < I/(m r²) <= 1: 1/2 of a disk, 2/5 of a sphere.
     incline : array_like
         Angle β at which the incoming belt rises towards the pulley, rad, within ±π/2.
     ride_length : array_like
-        Way on the belt before it meets the pulley, m, >= 0. It matters on an incline only, with
-        finite friction, where particles slide or roll.
+        Distance on the belt up to the pulley, m, >= 0. It matters only on an incline with finite
+        friction, if particles slide or roll.
     interval : array_like, optional
         Time per particle, s, the t that Eq. (15) leaves open; without it P is NaN.
     rebound : {"corrected", "as-printed"}
         Which Eq. (9). The printed one is defined for α = 0 without plate friction only.
     unbounded_plate : bool
-        False: do not object when ride or rebound meet the plate's line elsewhere, as a rebound must
-        for α < 0; for callers that know where the plate ends.
+        False: accept that ride or rebound meet the plate's line elsewhere, as a rebound must for α
+        < 0; for callers that know where the plate ends.
 
     Returns
     -------
@@ -263,7 +262,7 @@ def transfer(
     )
     sin, cos = sin_cos(angle)
     to_pivot = (pulley_radius + distance) * cos + pivot_height * sin - particle_radius
-    # The gap on the pulley is least where the centre's radius is square to the plate.
+    # The gap on the pulley is least where the centre's radius is perpendicular to the plate.
     closest = np.clip(0.5 * np.pi - angle, -incline, left.phi1)
     behind = to_pivot < ride_radius * sin_cos(closest + angle)[0]
     behind &= found.fine
@@ -278,7 +277,7 @@ def transfer(
     discriminant = closing**2 - 2.0 * gravity * sin * gap
     normal = np.sqrt(discriminant)
     t2 = 2.0 * gap / (closing + normal)  # Eq. (5)
-    # Thrown up steeply, it meets a plate that leans away when it comes down again.
+    # Thrown up steeply, it meets a plate that leans away only when it comes down again.
     parts = (closing <= 0.0) & (sin >= 0.0)
     comes_down = np.isfinite(left.again) & ~(~parts & (t2 <= left.again))
     found.fail(comes_down, Reason.EARLY.because("pulley: the flight comes down on it again"))
@@ -318,7 +317,7 @@ def transfer(
         phi2r = atan2(away, down)  # Eq. (8)
     found.keep(phi2r=phi2r, v2r=v2r, omega2=turning(rim))
 
-    # Fall on the outgoing belt, and be taken along by it.
+    # Fall on the outgoing belt, which takes it along.
     found.require(
         {
             "0 <= drop < inf": (drop >= 0.0) & (drop < np.inf),
@@ -376,7 +375,7 @@ def rebounded(
 ) -> tuple[Floats, Floats, Floats]:
     """Return velocities off the plate and down along it, and the rim's, after an impact, m/s.
 
-    Before it they are `normal`, into the plate, `tangential` and `rim`.
+    Before the impact they are `normal` (into the plate), `tangential` and `rim`.
     """
     # Coulomb: the impulse that stops the slip, or as much of it as friction can give.
     slip = tangential - rim
@@ -394,7 +393,7 @@ def belt_power(
     lift: ArrayLike = 0.0,
     gravity: ArrayLike = 9.81,
 ) -> Floats:
-    """Return the power, W, that a belt needs to carry a steady stream, beside that to run empty.
+    """Return the power, W, that a belt needs for a steady stream, besides running empty.
 
     P = ṁ v_b (v_b - v_x) + ṁ g H: the load is brought to the belt's speed, slip heat included,
     and lifted.
@@ -404,8 +403,8 @@ def belt_power(
     rate_t_h : array_like
         ṁ in tonnes an hour, 3.6 t/h = 1 kg/s.
     belt_speed, feed_speed : array_like
-        v_b of the belt, and v_x of the load along the belt as it comes on it, m/s. It must not roll
-        on the belt.
+        v_b of the belt, and v_x of the load along the belt at its arrival, m/s. It must not roll on
+        the belt.
     lift : array_like
         H, by which the belt rises, m; negative where it falls.
     gravity : array_like

@@ -1,9 +1,9 @@
-"""Types of arrays and of callbacks, each named once; sine, cosine and their inverses; bisection.
+"""Types of arrays and callbacks; sine, cosine and their inverses; bisection.
 
-Those of libraries differ in the last bit from one to another. These are of + - * / and square roots
-alone: the same bits everywhere, and in the core, whose ``trig.c``, which the page uses too, has the
-same operations in the same order. The polynomials are those of fdlibm (Sun Microsystems, 1993),
-which are free to use. All take numbers or arrays.
+Those of libraries differ in the last bit. These use only + - * / and square roots: the same bits
+everywhere, also in the core, whose ``trig.c`` (used by the page, too) has the same operations in
+the same order. The polynomials are those of fdlibm (Sun Microsystems, 1993), which are free to use.
+All take numbers or arrays.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ Progress = Callable[[float], None]
 raise `results.recorder.EnoughError`: the run ends there, with what is recorded."""
 
 Watch = Callable[[], None]
-"""Called now and then in work that may take long; what it raises ends the work."""
+"""Called now and then in work that may take long; an exception that it raises ends the work."""
 
 
 def unwatched() -> None:
-    """Let the work go on, whatever it takes."""
+    """Do nothing: the work goes on however long it takes."""
 
 
 def put(rows: NDArray[Any], places: Ints, values: NDArray[Any]) -> None:
-    """Put records at some places: as bytes, fifty times as fast as field by field."""
+    """Put records at some places, as bytes: fifty times as fast as field by field."""
     items = rows.view(f"V{rows.itemsize}")
     np.put(items, places, values.view(items.dtype))
 
 
 def sorted_by(numbers: Ints, most: int) -> Ints:
-    """Return what sorts numbers from 0 to `most`: those of two bytes five times as fast."""
+    """Return the order that sorts numbers from 0 to `most`; fast if two bytes hold them."""
     return np.argsort(numbers.astype(np.min_scalar_type(most)), kind="stable")
 
 
@@ -48,7 +48,7 @@ RADIANS = np.pi / 180.0
 """Of one degree."""
 
 LARGEST_ANGLE = 1e6
-"""rad; beyond, π/2 in three parts of 33 bits is no longer subtracted exactly."""
+"""rad; for larger angles π/2 in three parts of 33 bits is no longer subtracted exactly."""
 
 _ROUND = 1.5 * 2.0**52
 """Adding and subtracting it rounds to a whole number."""
@@ -73,7 +73,7 @@ _A0, _A1, _A2, _A3, _A4, _A5, _A6, _A7, _A8, _A9, _A10 = (
     -3.65315727442169155270e-02, 1.62858201153657823623e-02,
 )  # fmt: skip
 
-# Angles and what their doubles lack: the arc tangent of 1/2, π/4, π/2 and π.
+# Angles and their rounding errors as doubles: the arc tangent of 1/2, π/4, π/2 and π.
 _HALF, _HALF_LOW = 4.63647609000806093515e-01, 2.26987774529616870924e-17
 _EIGHTH, _EIGHTH_LOW = 7.85398163397448278999e-01, 3.06161699786838301793e-17
 _QUARTER, _QUARTER_LOW = 1.57079632679489655800e00, 6.12323399573676603587e-17
@@ -86,7 +86,7 @@ def sin_cos(angle: Any) -> tuple[Any, Any]:
     Parameters
     ----------
     angle : float or ndarray
-        rad; NaN comes of those beyond `LARGEST_ANGLE`.
+        rad; the result is NaN beyond `LARGEST_ANGLE`.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def sin_cos(angle: Any) -> tuple[Any, Any]:
         sine, cosine = sin_cos(float(angle.item()))
         return np.full(angle.shape, sine)[()], np.full(angle.shape, cosine)[()]
     if isinstance(angle, float):
-        # The same in a twentieth of the time.
+        # The same operations in a twentieth of the time.
         if not abs(angle) <= LARGEST_ANGLE:
             return np.float64(np.nan), np.float64(np.nan)
         sine, cosine, turns = _within_a_quarter(float(angle))
@@ -116,9 +116,9 @@ def sin_cos(angle: Any) -> tuple[Any, Any]:
 
 
 def _within_a_quarter(angle: Any) -> tuple[Any, Any, Any]:
-    """Return sine and cosine of what is left of an angle less quarter turns, and how many."""
+    """Return sine and cosine of an angle less quarter turns, and their number."""
     turns = (angle * _QUARTERS + _ROUND) - _ROUND
-    # The rest, as the sum of x and a tail, without its first digits cancelling away.
+    # The rest as the sum of x and a tail, without cancellation of its leading digits.
     first = angle - turns * _PART1
     second = first - turns * _PART2
     lost = (first - second) - turns * _PART2
@@ -180,12 +180,12 @@ def arc_cos(cosine: Any) -> Any:
 
 
 def hypot(x: Any, y: Any) -> Any:
-    """Return the length of a vector, for sizes of which squares neither overflow nor vanish."""
+    """Return the length of a vector whose squares neither overflow nor vanish."""
     return np.sqrt(x * x + y * y)
 
 
 def bisected(test: Callable[[float], object], low: float, high: float) -> tuple[float, float]:
-    """Return neighbouring values of which a test, true at `high`, is false and true."""
+    """Return neighbouring values with a test false and true; it is true at `high`."""
     least = 1e-15 * high
     while low < (middle := 0.5 * (low + high)) < high and high - low > least:
         low, high = (low, middle) if test(middle) else (middle, high)

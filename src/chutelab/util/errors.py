@@ -1,4 +1,4 @@
-"""Invalid input, its faults and what was probably meant; libraries that are missing or too old."""
+"""Invalid input, its faults and suggestions; libraries that are missing or too old."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any, Final
 
 
 def did_you_mean(word: str, known: Iterable[str], otherwise: str, *, most: int = 1) -> str:
-    """Ask for the names that are most like a word, up to `most`; say something else if none is.
+    """Suggest up to `most` names similar to a word; say something else if there are none.
 
     >>> did_you_mean("hod", ["hood", "floor"], "there are hood, floor")
     'did you mean hood?'
@@ -25,13 +25,13 @@ def did_you_mean(word: str, known: Iterable[str], otherwise: str, *, most: int =
 
 
 def nearest(key: str, known: Iterable[str]) -> list[str]:
-    """Return the known key that is most like one, in a list; none if none is like it.
+    """Return the most similar known key in a list; an empty list if none is similar.
 
     >>> nearest("pivot", ["pivot_height", "above"])
     ['pivot_height']
     """
     known = list(known)
-    # With their unit or without: angel is angle_deg.
+    # Compare keys with and without their unit: angel is angle_deg.
     names = {name.removesuffix("_deg"): name for name in known} | {name: name for name in known}
     near = difflib.get_close_matches(key, names, n=1, cutoff=0.55)
     return [names[name] for name in near]
@@ -67,12 +67,12 @@ class _Missing:
 
 
 MISSING: Final = _Missing()
-"""The value of a fault whose key is not there."""
+"""The value of a fault if its key is missing."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong with what was given.
+    """One fault of an input.
 
     Parameters
     ----------
@@ -81,8 +81,8 @@ class Fault:
         as it was typed; a place in the text (``line 3, column 5``) for a syntax error; empty if the
         whole file is at fault.
     value
-        What was found there; `MISSING` if the key has to be there and is not; None if there is
-        nothing to show (TOML has no null).
+        The value found; `MISSING` if a required key is missing; None if there is nothing to show
+        (TOML has no null).
     allowed
         What would be right, in words.
     """
@@ -114,14 +114,14 @@ class InputError(ValueError):
     allowed, key, value
         The fault, see `Fault`.
     file
-        Where it is, or a stand-in such as ``<scene>``; "" for none.
+        The file, or a placeholder such as ``<scene>``; "" for none.
 
     Attributes
     ----------
     faults : list of Fault
         At least one; `key`, `value` and `allowed` are those of the first.
     hint : str
-        What to do next, if there is something better than mending each fault.
+        What to do next, if there is something better than correcting each fault.
     """
 
     def __init__(self, allowed: str, key: str = "", value: object = None, file: str = "") -> None:
@@ -137,7 +137,7 @@ class InputError(ValueError):
 
     @property
     def value(self) -> object:
-        """What was found there."""
+        """The value found."""
         return self.faults[0].value
 
     @property
@@ -170,7 +170,7 @@ class MissingLibraryError(ImportError):
 
 
 def library(module: str, what: str, extra: str) -> Any:
-    """Return a module of a package that only one of Chutelab's extras brings.
+    """Return a module of a package that only one of Chutelab's extras installs.
 
     Raises a `MissingLibraryError` without it, or if it is too old; says `what`, such as "a fit
     needs SciPy", and what to install.
@@ -191,14 +191,14 @@ _VERSION = re.compile(r"^Version: (.+)$", re.MULTILINE)
 
 
 def too_old(extra: str | None = None) -> list[str]:
-    """Return for what packages are too old that are installed, by the bounds of chutelab's own.
+    """Return the installed packages that are older than chutelab's lower bounds.
 
-    Such as "pydantic>=2.9 (2.7.0 is installed)". By default those that it always needs, else those
-    of one extra. Empty where it is not installed itself.
+    Such as "pydantic>=2.9 (2.7.0 is installed)". By default of those that it always needs, else of
+    one extra. Empty if chutelab itself is not installed.
     """
     found = []
     for bound in _BOUND.finditer(_metadata("chutelab")):
-        # What is not there the import says.
+        # Missing packages are reported by their import.
         said = _VERSION.search(_metadata(bound[1])) if bound[3] == extra else None
         if said is not None and _numbers(said[1]) < _numbers(bound[2]):
             found.append(f"{bound[1]}>={bound[2]} ({said[1]} is installed)")
@@ -207,7 +207,7 @@ def too_old(extra: str | None = None) -> list[str]:
 
 def _metadata(package: str) -> str:
     """Return the METADATA of a package as text, which is fast; "" if it is not installed."""
-    # Here, as the help of a command needs none of it.
+    # Imported here, as the help of a command does not need it.
     from importlib.metadata import PackageNotFoundError, distribution
 
     with suppress(PackageNotFoundError):
@@ -223,7 +223,7 @@ def _numbers(version: str) -> tuple[int, ...]:
 def need_all() -> None:
     """Raise a `MissingLibraryError` if a package that chutelab always needs is too old.
 
-    Some of them fail only by doing less.
+    Some old versions do not fail, but do less.
     """
     if old := too_old():
         needed = " ".join(f'"{line.partition(" ")[0]}"' for line in old)
@@ -236,14 +236,14 @@ def cut(text: str, width: int) -> str:
 
 
 _KEPT: Final = "\u00a0\u2007\u2009\u202f\u200c\u200d"
-"""Characters that Python does not call printable, though many languages need them: spaces at which
-no line is broken, and what joins letters or keeps them apart."""
+"""Characters that Python does not count as printable, though many languages need them: non-breaking
+spaces, and those that join or separate letters."""
 
 
 def printable(text: str) -> str:
-    r"""Replace what a terminal would obey or cannot show by its escape.
+    r"""Replace characters that control a terminal, or that it cannot show, by escapes.
 
-    That is control characters, and those that turn the direction of what is read.
+    These are control characters, and those that change the direction of text.
 
     >>> print(printable("\x1b[31m\u202e"), printable("café, 漢字"))
     \x1b[31m\u202e café, 漢字
@@ -284,7 +284,7 @@ def _toml(value: object, depth: int) -> str:
         case list() | tuple():
             if depth > 2:
                 return "[...]"
-            # Enough elements to fill the line, never the whole of a long list.
+            # Enough elements to fill the line, never all of a long list.
             inner = [_toml(item, depth + 1) for item in value[:_VALUE_WIDTH]]
             return f"[{', '.join(inner)}]"
         case None:

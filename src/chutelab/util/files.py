@@ -1,6 +1,6 @@
-"""Files that are written whole or not at all, tables in them, and the versions that they name.
+"""Files that are written whole or not at all; tables in them; versions of packages.
 
-It imports no NumPy: commands that need none answer at once.
+It does not import NumPy, so that commands without it start at once.
 """
 
 from __future__ import annotations
@@ -21,21 +21,22 @@ from chutelab.util.errors import InputError, printable
 from chutelab.util.signals import held
 
 _ASIDE: Final = ".chutelab-unfinished-"
-"""Beginning of the names of folders in which files are made before they get their place."""
+"""Beginning of the names of folders in which files are made before they are moved to their
+place."""
 
 _OLD: Final = 3600.0
-"""s after which a folder that no process holds counts as left by a killed program."""
+"""s after which a folder that no process holds counts as left over by a killed program."""
 
 
 @contextmanager
 def aside(folder: Path, target: Path | None = None) -> Iterator[Path]:
-    """Give an empty folder to make files in that shall be moved to `folder`; removed at the end.
+    """Give an empty folder for files that will be moved to `folder`; removed at the end.
 
-    It lies in there, or in what there is of the folders above, so that a move is an atomic rename.
-    To be entered before long work: what cannot be written to is refused at once. KILL and power
+    It is inside `folder`, or its nearest existing parent, so that a move is an atomic rename. Enter
+    it before long work, since a folder that cannot be written to is refused at once. KILL and power
     cuts leave it behind; the next one in the same place removes it, see `_remove_left_over`.
 
-    Raises an `OSError`; one of a file in here, or without a name, has the name of `target`, by
+    Raises an `OSError`; for a file in here, or without a name, it has the name of `target`, by
     default `folder`.
     """
     import shutil
@@ -46,7 +47,7 @@ def aside(folder: Path, target: Path | None = None) -> Iterator[Path]:
         anchor = next((path for path in (folder, *folder.parents) if path.exists()), folder)
         if not anchor.is_dir():
             raise NotADirectoryError(ENOTDIR, f"{anchor} is a file, not a folder", str(folder))
-        # Folders of programs that were killed: old ones whose lock is free. Not on Windows.
+        # Left-over folders of killed programs are old and their lock is free. Not on Windows.
         for path in anchor.glob(f"{_ASIDE}????????"):
             with suppress(OSError):
                 if time.time() - path.lstat().st_mtime > _OLD and not path.is_symlink():
@@ -68,10 +69,10 @@ def aside(folder: Path, target: Path | None = None) -> Iterator[Path]:
 def together(folder: Path) -> Iterator[Path]:
     """Give an empty folder to make files and folders in; at the end its files move to `folder`.
 
-    That is made if need be; what else is in it stays. A signal waits until all have moved.
+    `folder` is made if necessary; other files in it stay. A signal waits until all have moved.
 
-    Raises an `OSError` where `aside` does, or if something that is no file is where one should go:
-    none is moved then.
+    Raises an `OSError` like `aside`, or if something that is not a file is in the place of one;
+    then none is moved.
     """
     with aside(folder) as made:
         yield made
@@ -87,9 +88,9 @@ def together(folder: Path) -> Iterator[Path]:
 
 
 def first_bytes(path: Path, most: int) -> bytes:
-    """Read a file, up to one byte more than `most`, so that larger ones show.
+    """Read a file, up to one byte more than `most`, so that larger ones are noticed.
 
-    A named pipe is refused: perhaps no process ever writes to it.
+    A named pipe is refused, since perhaps no process ever writes to it.
     """
     if path.is_fifo() and Path(os.path.realpath(path)).exists():
         raise OSError(EINVAL, "it is a pipe, not a file", str(path))
@@ -99,7 +100,7 @@ def first_bytes(path: Path, most: int) -> bytes:
 
 @contextmanager
 def _held(folder: Path) -> Iterator[bool]:
-    """Hold a folder's lock, which ends with the process however that ends; tell if it was free."""
+    """Lock a folder until the process ends, in whatever way; return whether it was free."""
     try:
         import fcntl
     except ImportError:  # Windows
@@ -121,8 +122,8 @@ def _held(folder: Path) -> Iterator[bool]:
 def whole(path: str | Path) -> Iterator[Path]:
     """Give a path to write to; it becomes `path` at the end, or is removed after an exception.
 
-    A link stays, and what it leads to is written. Only files are replaced: a rename would put one
-    in the place of a device, such as /dev/null, or a pipe.
+    If `path` is a link, its target is written. Only files are replaced: a rename would replace a
+    device, such as /dev/null, or a pipe by a file.
     """
     with _beside(Path(path)) as unfinished:
         yield unfinished
@@ -137,10 +138,10 @@ def check(path: str | Path) -> None:
 
 @contextmanager
 def writing(what: object = "", instead: str = "") -> Iterator[None]:
-    """Turn the OSError of a file that cannot be written into a `InputError`.
+    """Turn the OSError of a file that cannot be written into an `InputError`.
 
-    It calls the file `what`, by default what the error does, and says what to give `instead`.
-    Of an error that names two files, such as one in copying, the second is the one that is written.
+    It calls the file `what`, by default as in the error, and says what to give `instead`. If an
+    error names two files, as in copying, the second is the one that is written.
     """
     try:
         yield
@@ -152,7 +153,7 @@ def writing(what: object = "", instead: str = "") -> Iterator[None]:
 
 
 def refuse_other(path: Path) -> None:
-    """Raise an OSError if something is there that is no file."""
+    """Raise an OSError if something other than a file is there."""
     if path.is_dir():
         raise IsADirectoryError(EISDIR, f"{path} is a folder, not a file", str(path))
     if path.exists() and not path.is_file():
@@ -170,17 +171,17 @@ def _beside(path: Path) -> Iterator[Path]:
 
 
 _FORMULA: Final = r"((?:\A|[;\t\r\n])[\s\"']*)({}[=+\-@\uff1d\uff0b\uff0d\uff20])"
-"""What a spreadsheet takes for a formula, at the start of a cell or of what becomes one where
-semicolons or tabs separate the cells; the last four are Japanese keyboards' =, +, - and @."""
+"""Text that a spreadsheet takes for a formula, at the start of a cell, or after a semicolon or tab
+that may separate cells; the last four are the =, +, - and @ of Japanese keyboards."""
 
 _BARE: Final = re.compile(_FORMULA.format(""))
 _QUOTED: Final = re.compile(_FORMULA.format("'"))
 
 
 def harmless(cell: object) -> object:
-    """Return a cell with a quote before whatever a spreadsheet would take for a formula.
+    """Return a cell with a quote before text that a spreadsheet would take for a formula.
 
-    Numbers stay as they are, also those that are written out.
+    Numbers stay as they are, also those given as text.
 
     >>> harmless("=1+1"), harmless("a;=1+1"), harmless("-0.5"), harmless(-0.5)
     ("'=1+1", "a;'=1+1", '-0.5', -0.5)
@@ -195,7 +196,7 @@ def harmless(cell: object) -> object:
 
 
 def unquoted(cell: str) -> str:
-    """Return the text that `harmless` made this cell of."""
+    """Return the text from which `harmless` made this cell."""
     return _QUOTED.sub(lambda found: found[1] + found[2].removeprefix("'"), cell)
 
 
@@ -204,13 +205,13 @@ def csv_lines(
 ) -> Iterator[str]:
     r"""Yield rows as lines of CSV, cells quoted where they must be.
 
-    None is an empty cell, numbers come back to the last bit; no text is a formula, see `harmless`.
+    None is an empty cell, numbers keep all bits; no text is a formula, see `harmless`.
 
     >>> list(csv_lines([("t", "what"), (0.1, "a, b"), (1, None)]))
     ['t,what\n', '0.1,"a, b"\n', '1,\n']
     """
     # `writerow` returns what `write` does: the line.
-    # Cells are only quoted for the line ends that it writes itself, so it writes both.
+    # Cells are quoted only for line ends that the writer uses itself, so it uses both.
     out = csv.writer(SimpleNamespace(write=str), delimiter=separator, lineterminator="\r\n")
 
     def cell(value: object) -> object:
@@ -238,25 +239,26 @@ def csv_text(columns: Mapping[str, Any]) -> str:
 def csv_columns(columns: Iterable[Any]) -> str:
     r"""Return columns, arrays of one length of floats or of objects, as the lines of CSV.
 
-    Numbers have as few digits as give them back, whole ones no point; NaN is an empty cell. What
-    are no floats is written by `csv_lines`.
+    Numbers have the fewest digits that keep all bits, whole ones no point; NaN is an empty cell.
+    Columns of other objects are written by `csv_lines`.
 
     >>> import numpy as np
     >>> csv_columns([np.array([0.1, 2.0, np.nan]), np.array(["a", "=b", "a"], dtype=object)])
     "0.1,a\n2,'=b\n,a\n"
     """
-    # Here, as it takes a while: it writes shortest digits in a seventh of the time of `repr`.
+    # Imported here, as that takes a while; it writes shortest digits in a seventh of the time of
+    # `repr`.
     from pydantic_core import to_json
 
     cells, known = [], dict[bytes, list[str]]()
     for column in columns:
         values = column.tolist()
         if column.dtype.kind != "f":
-            # Behind a cell, as a line of one empty cell is written with quotes.
+            # After another cell, as a line of one empty cell is written with quotes.
             each = {one: next(csv_lines([(None, one)]))[1:-1] for one in dict.fromkeys(values)}
             cells.append([each[one] for one in values])
             continue
-        # Several columns may hold the same numbers, and digits take longest.
+        # Several columns may have the same numbers, and digits take the most time.
         bits = column.tobytes()
         if bits not in known:
             text = to_json(values).decode()[1:-1].replace("Infinity", "inf") + ","
@@ -268,8 +270,7 @@ def csv_columns(columns: Iterable[Any]) -> str:
 def tsv_text(rows: Sequence[object], kind: type, about: Mapping[str, str]) -> str:
     """Return rows of a dataclass as tab-separated values.
 
-    Lines of ``# key: value`` come first and say where the figures are from; then the names of the
-    columns.
+    Lines ``# key: value`` with the origin of the figures come first, then the names of the columns.
     """
     names = [field.name for field in fields(kind)]
     cells = [[getattr(row, name) for name in names] for row in rows]
@@ -292,5 +293,5 @@ def version_of(package: str) -> str | None:
 
 
 def own_version() -> str:
-    """Return chutelab's version, as far as it is known."""
+    """Return chutelab's version, if it is known."""
     return version_of("chutelab") or "unknown (not installed)"

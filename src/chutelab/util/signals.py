@@ -1,7 +1,7 @@
 """Signals that tell a program to end: Ctrl-C, TERM and HUP, all raised as a KeyboardInterrupt.
 
-So whatever cleans up after Ctrl-C cleans up after all of them. It imports next to nothing: the
-command line is guarded by it before anything else is imported.
+So code that cleans up after Ctrl-C cleans up after all of them. It imports almost nothing, as the
+command line uses it before any other import.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ Later ones are raised again: the first may have been lost in code that catches e
 class Terminated(KeyboardInterrupt):
     """The program was told to end, by the signal `signum`.
 
-    Ctrl-C too: of a plain KeyboardInterrupt that has passed through `exec`, Python remembers it to
-    the end, and kills itself then although it was caught.
+    Also for Ctrl-C: if a plain KeyboardInterrupt has passed through `exec`, Python kills itself at
+    the end although it was caught.
     """
 
     def __init__(self, signum: int) -> None:
@@ -44,11 +44,11 @@ _obeyed: list[tuple[int, float]] = []
 """The signals that were raised, and when, s."""
 
 _answered: list[tuple[int, float]] = []
-"""Those of them that are answered: what goes on knows of them."""
+"""Signals that have been handled: the code that goes on knows of them."""
 
 
 def answer() -> None:
-    """Go on after a signal that was caught: `ctrl_c_waits` raises it no more."""
+    """Go on after a signal that was caught: `ctrl_c_waits` does not raise it again."""
     _answered[:] = _obeyed
 
 
@@ -57,9 +57,9 @@ def raised(*, last: bool = False) -> Iterator[None]:
     """Raise `Terminated` for each signal of `NAMES`.
 
     Signals that are ignored (``nohup``, jobs in the background) or have another handler are left
-    alone, and so are all in a thread, which can set none. With `last` the program
-    ends after this: then a signal no longer raises anything, since nothing would catch it, but ends
-    the process at once with the exit code that it would have had.
+    alone, as are all in a thread, which cannot set handlers. With `last` the program ends after
+    this: then a signal raises nothing, since nothing would catch it, but ends the process at once
+    with the exit code that it would have had.
     """
     usual = (signal.SIG_DFL, signal.default_int_handler)
     known = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
@@ -67,7 +67,7 @@ def raised(*, last: bool = False) -> Iterator[None]:
     ignored = sys.unraisablehook
 
     def again(about: Any) -> None:
-        """Raise a signal again that came where Python passes over errors: in a finalizer, say."""
+        """Raise again a signal that came where Python ignores errors, such as in a finalizer."""
         if not isinstance(about.exc_value, Terminated):
             ignored(about)
             return
@@ -101,7 +101,7 @@ _kept: list[int] | None = None
 
 @contextmanager
 def held() -> Iterator[None]:
-    """Let what happens here happen whole: a signal that comes is raised afterwards."""
+    """Run a block without interruption: a signal that comes is raised afterwards."""
     global _kept
     kept: list[int] = []
     _kept = kept
@@ -115,13 +115,13 @@ def held() -> Iterator[None]:
 
 @contextmanager
 def ctrl_c_waits(*, lazily: bool = False) -> Iterator[Callable[[], None]]:
-    """Give a function that raises what a Ctrl-C would have raised before.
+    """Give a function that raises a delayed Ctrl-C.
 
-    So a run is interrupted where it can be, and keeps what it has. One that comes `GRACE` after the
-    first is obeyed at once. In a thread, and where there is another handler, nothing changes. The
-    function also raises again what `raised` has raised: work that goes on shows that some code
-    which catches everything, an import say, has lost it. With `lazily` nothing waits before the
-    function is called: what is over sooner needs no handler.
+    So a run is interrupted at a suitable point, and keeps its results. A signal that comes `GRACE`
+    after the first is raised at once. In a thread, and with another handler, nothing changes. The
+    function also raises again what `raised` has raised: if work goes on, some code that catches
+    everything (an import, say) has lost it. With `lazily` signals are delayed only from the first
+    call of the function on, as short work needs no handler.
     """
     came: list[float] = []
     before: Any = None
@@ -175,10 +175,10 @@ def _obey(signum: int, _frame: object) -> None:
 
 
 def exit_code(error: BaseException | None) -> int | None:
-    """Return the exit code if a signal is behind an error, else None.
+    """Return the exit code if a signal caused an error, else None.
 
-    Compiled code may turn a KeyboardInterrupt into an error of its own, and keep no trace of it:
-    whatever fails after a signal was raised fails because of it.
+    Compiled code may turn a KeyboardInterrupt into another error without a trace of it, so any
+    failure after a signal was raised counts as caused by it.
     """
     if _obeyed:
         return 128 + _obeyed[0][0]

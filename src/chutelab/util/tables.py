@@ -20,20 +20,20 @@ WIDTH = 80
 """Columns of a line of prose in a terminal, at most."""
 
 LONG = 55
-"""Characters from which the first cell of a row may be broken, as a path may have to be."""
+"""A first cell of a row with at least so many characters may be broken, such as a path."""
 
 UNBOUNDED = 10_000
-"""Columns of a table that is no wider than its cells."""
+"""Width of a table that is only as wide as its cells."""
 
 STYLES = {"ok": "green", "FAILED": "bold red"}
-"""Colours of verdicts, in a terminal that has some; what failed has it in all of its row."""
+"""Colours of verdicts in a terminal; a failure colours its whole row."""
 
 
 @dataclass(frozen=True)
 class Sheet:
     """A table of words and numbers."""
 
-    title: str  # what it shows, with units; "" for none
+    title: str  # title, with units; "" for none
     columns: tuple[str, ...]  # heads, "" where a column needs none
     # cells; those of the foot stand below a line. The first line of a cell of several is bold. A
     # row of one cell is a heading over the rows that follow
@@ -73,11 +73,11 @@ class Sheet:
             )
             for index, (name, width) in enumerate(zip(self.columns, widest, strict=True)):
                 if not self._has_words(index):
-                    # Tables under several headings are to have the same columns.
+                    # Tables under several headings should have the same columns.
                     least = max(width, len(name)) if headed else width
                     table.add_column(name, justify="right", min_width=least)
                 elif index == 0 and width < LONG:
-                    # What a row is about stays on one line, unless it is a long path.
+                    # The first cell of a row stays on one line, unless it is a long path.
                     table.add_column(name, no_wrap=True, min_width=width)
                 else:
                     table.add_column(name, overflow="fold")
@@ -104,7 +104,7 @@ class Sheet:
         from rich.console import Console
 
         out = io.StringIO()
-        # In a notebook rich would show the table, not write it.
+        # In a notebook rich would display the table instead of returning it.
         Console(file=out, width=UNBOUNDED, color_system=None, force_jupyter=False).print(self)
         return "\n".join(
             printable(line.rstrip()) for line in out.getvalue().strip("\n").split("\n")
@@ -123,7 +123,7 @@ class Sheet:
         if foot:
             foot = f'<tfoot style="border-top:1px solid">{foot}</tfoot>'
         notes = "".join(f'<p style="max-width:45em">{escape(note)}</p>' for note in self.notes)
-        # Notebooks take what is between two dollar signs for mathematics, but not where it says so.
+        # Notebooks take text between two dollar signs for mathematics unless told otherwise.
         table = f"<table>{caption}{head}<tbody>{body}</tbody>{foot}</table>"
         return f'<div class="tex2jax_ignore mathjax_ignore">{table}{notes}</div>'
 
@@ -145,10 +145,10 @@ class Sheet:
 
 
 class Shown:
-    """Something that displays itself as its `sheet`, in a terminal and in a notebook."""
+    """An object that is displayed as its `sheet`, in a terminal and in a notebook."""
 
     def sheet(self) -> Sheet:
-        """Return what is to be shown."""
+        """Return the sheet to be shown."""
         raise NotImplementedError
 
     def __repr__(self) -> str:
@@ -185,7 +185,7 @@ def number(value: float) -> str:
 
 
 def plus_minus(value: float, error: float) -> str:
-    """Return a value with its uncertainty, to the digits that mean something.
+    """Return a value with its uncertainty, to the significant digits.
 
     >>> plus_minus(0.62134, 0.00213), plus_minus(1.9, 0.0)
     ('0.6213 ± 0.0021', '1.9 ± 0')
@@ -211,16 +211,16 @@ def many(count: int, what: str, style: str = "") -> str:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON has it.
+    """Return a value as plain data for JSON.
 
-    Dataclasses become objects, arrays lists, and what is not finite None.
+    Dataclasses become objects, arrays lists, and numbers that are not finite None.
 
     >>> plain({"x": (1.0, float("nan")), "n": (1, 2)})
     {'x': [1.0, None], 'n': [1, 2]}
     """
     if value is None or isinstance(value, str | int):
         return value
-    if hasattr(value, "tolist"):  # what NumPy has
+    if hasattr(value, "tolist"):  # arrays and numbers of NumPy
         value = value.tolist()
     if isinstance(value, float):
         return value if isfinite(value) else None

@@ -1,8 +1,8 @@
 """Texts in each language: a catalogue of templates, ``strings/LANGUAGE.json``.
 
-A translation is a file. Templates have ``{names}`` for what is filled in. Keys that begin with
-``picture-`` stand in films and pictures; an exercise in a live page reads the same files, in which
-keys that begin with ``python-`` speak of cells and ``task``, which it has not.
+A translation is a file. Templates have ``{names}`` for values. Keys that begin with ``picture-``
+are used in films and pictures. Exercises in live pages use the same files, except keys that begin
+with ``python-``, which are about cells and ``task``.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Words:
         return "".join(said.get(sign, sign) for sign in format(value, form))
 
     def titles(self) -> dict[str, str]:
-        """Return the titles of the shipped scenes in this language, by those that they have.
+        """Return the titles of the shipped scenes in this language, by their own titles.
 
         >>> words("de").titles()["A see-saw"]
         'Eine Wippe'
@@ -71,7 +71,7 @@ class Words:
         return {text: self.catalogue[key] for key, text in own.items()}
 
     def title(self, title: str) -> str:
-        """Return the title of a scene: those of shipped ones are there in each language."""
+        """Return the title of a scene; those of shipped ones exist in each language."""
         return self.titles().get(title, title)
 
     def unit(self, unit: str) -> str:
@@ -81,7 +81,7 @@ class Words:
 
 @cache
 def words(language: str = "en") -> Words:
-    """Return what is said in a language, such as "de"; what it has not is said in English.
+    """Return the words of a language, such as "de"; missing ones are in English.
 
     Raises a `LanguageError` if there is no such language; the message lists those there are.
     """

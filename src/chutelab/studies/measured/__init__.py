@@ -1,4 +1,4 @@
-"""Measured tracks over the model: read, compare, fit.
+"""Measured tracks: read, compare with the model, fit.
 
 >>> from chutelab import load, measured
 >>> film = measured.read("perpendicular-track")
@@ -6,15 +6,15 @@
 >>> [f"{value:.2f}" for value in found.values]
 ['0.62', '1.90']
 
-`fit` finds by least squares the parameters with which the simulation follows the measured points
-best: numbers of a scene, and how the points lie in the world. Units and bounds are those of the
-scene's own validation, read from its JSON Schema. It needs ``pip install "chutelab[fit]"``.
+`fit` finds by least squares the parameters with which the simulation agrees best with the measured
+points: numbers of a scene, and the placement of the points in the world. Units and bounds are those
+of the scene's own validation, read from its JSON Schema. It needs ``pip install "chutelab[fit]"``.
 
-- `track`: a `Track`, points with their times, how they lie in the world (`Placement`), and how far
-  off the simulation (`Residuals`).
+- `track`: a `Track`, points with their times, their placement in the world (`Placement`), and their
+  distance from the simulation (`Residuals`).
 - `reading`: the files that the video-analysis program Tracker exports, as tracks; the shipped one
-  was made from a simulation with noise, so that its answer is known.
-- `result`: what a fit found, what makes it less certain than it looks, and its files.
+  was made from a simulation with noise, so the right answer is known.
+- `result`: the result of a fit, warnings about it, and its files.
 """
 
 from __future__ import annotations
@@ -56,12 +56,13 @@ __all__ = [
 ]  # fmt: skip
 
 SMALLEST: Final = 1e-6
-"""Of its start: the least value at which a number that must be positive is searched. A fit of what
-the points do not tell is driven to a bound by rounding, and next to 0 a length has no direction."""
+"""Share of its start: lower bound in the search for a number that must be positive. A fit of
+parameters that the points do not determine is driven to a bound by rounding, and next to 0 a length
+has no direction."""
 
 
 def placements(track: Track) -> dict[str, Parameter]:
-    """Return what can be fitted of a track's `Placement`."""
+    """Return the parameters of a track's `Placement` that can be fitted."""
     place, anything = track.placement, (-LARGEST, LARGEST)
     found = (
         Parameter("t0", "s", place.t0, *anything),
@@ -75,8 +76,8 @@ def placements(track: Track) -> dict[str, Parameter]:
 def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter, ...]:
     """Return the parameters that keys name.
 
-    Raises a `MeasuredError` with all keys that are unknown, no number, without a value to start
-    from, or given twice.
+    Raises a `MeasuredError` with all keys that are unknown, not numbers, without a starting value,
+    or given twice.
     """
     document, placed = to_dict(scene, defaults=True), placements(track)
     faults: list[Fault] = []
@@ -101,7 +102,7 @@ def changed(
 ) -> tuple[Scene, Track]:
     """Return scene and track with the values of some parameters changed.
 
-    Raises a `SceneError` if the scene refuses a value, or two that do not go together.
+    Raises a `SceneError` if the scene refuses a value, or values contradict each other.
     """
     given = {one.key: float(value) for one, value in zip(parameters, values, strict=True)}
     place = {key: given.pop(key, one.start) for key, one in placements(track).items()}
@@ -111,7 +112,7 @@ def changed(
 
 
 def _of_scene(document: Mapping[str, Any], key: str, others: Iterable[str]) -> Parameter | str:
-    """Return the parameter of a key of the scene, or why there is none, with other known keys."""
+    """Return the parameter of a key of the scene, or why there is none, and similar keys."""
     rule = None
     with suppress(ValueError):
         parts = resolved(document, key)
@@ -149,22 +150,23 @@ def numbers(document: Mapping[str, Any]) -> Iterator[str]:
 
 
 STEP = 1e-6
-"""Of a parameter's size. Tracks of the exact engine are smooth to rounding, so a difference over
-this step is right to about 1e-9, and next to no point lies within it of an impact."""
+"""Step of differences, as a share of a parameter's size. Tracks of the exact engine are smooth to
+rounding, so a difference over this step is accurate to about 1e-9, and almost no point is so near
+an impact."""
 
 SINGULAR = 1e-6
 """Least singular value, relative to the largest, of a Jacobian with columns of equal length: far
-above what differences leave of zero, far below what noise allows to measure."""
+above the error of differences, far below what noise allows to measure."""
 
 UNMOVED = 1e-7
-"""m; a parameter that moves the points by no more when it changes by its own size has no effect."""
+"""m; a parameter that moves the points by less when it changes by its own size has no effect."""
 
 PART = 0.1
-"""Share of a combination of parameters from which on a parameter is named as belonging to it."""
+"""A parameter with at least this share of a combination is named as part of it."""
 
 
 class Problem:
-    """What a fit makes small: p parameters, and which of the P points count, `used`, (P,)."""
+    """The least-squares problem: p parameters, and which of the P points count, `used`, (P,)."""
 
     def __init__(self, scene: Scene, track: Track, parameters: tuple[Parameter, ...]) -> None:
         self.scene, self.track, self.parameters = scene, track, parameters
@@ -230,8 +232,8 @@ class Problem:
     def elsewhere(self, values: Floats) -> Floats | None:
         """Return values with a smaller sum of squares, found by changing one at a time, or None.
 
-        Where the order of events changes, one bounce more before an edge, the sum of squares jumps,
-        and a descent does not get over it.
+        If the order of events changes (one bounce more before an edge, say), the sum of squares
+        jumps, and a descent does not pass it.
         """
         least, best = float(np.sum(self.tried(values) ** 2)), None
         for k, size in enumerate(self.sizes):
@@ -244,7 +246,7 @@ class Problem:
 
 
 def without_effect(derivatives: Floats, parameters: Sequence[Parameter]) -> list[str]:
-    """Say which parameters do not move the points at all; see `Problem.derivatives`."""
+    """Name the parameters that do not move the points at all; see `Problem.derivatives`."""
     moves = np.linalg.norm(derivatives, axis=0) / np.sqrt(len(derivatives))
     return [
         f"{parameter.key} does not move the particle where it was measured: leave it out"
@@ -254,7 +256,7 @@ def without_effect(derivatives: Floats, parameters: Sequence[Parameter]) -> list
 
 
 def inseparable(derivatives: Floats, parameters: Sequence[Parameter]) -> list[str]:
-    """Say which combinations of parameters the points cannot tell, though each moves them."""
+    """Name combinations of parameters that the points cannot separate, though each moves them."""
     directions = derivatives / np.linalg.norm(derivatives, axis=0)
     _, values, vectors = np.linalg.svd(directions, full_matrices=False)
     said = []
@@ -273,38 +275,39 @@ def inseparable(derivatives: Floats, parameters: Sequence[Parameter]) -> list[st
 
 
 ROUNDS = 5
-"""Fits in a row, each with the points that lie within the time simulated by the one before."""
+"""Most fits in a row, each with the points within the simulated time of the one before."""
 
 SEARCHED = 41
-"""Values tried of each parameter, over twice its size, when a fit is caught in a wrong minimum."""
+"""Values of each parameter, over twice its size, tried when a fit is in a wrong minimum."""
 
 KEPT = 0.9
-"""Least share of the points that a better minimum keeps: with fewer points every sum is smaller."""
+"""Least share of the points that a better minimum must keep, since with fewer points every sum is
+smaller."""
 
 TUNING = 2.0
-"""Standard deviations from which on a robust fit begins to believe a point less."""
+"""From so many standard deviations on, a robust fit gives a point less weight."""
 
 
 def fit(scene: AnyScene, track: Track, keys: Sequence[str], *, robust: bool = False) -> Fit:
-    """Fit parameters of a scene, or of how a track lies in it, to a measured track.
+    """Fit parameters of a scene, or of the placement of a track in it, to a measured track.
 
     Parameters
     ----------
     scene : Scene, str, path or mapping
-        Its values are where the fit starts, its validation gives the bounds.
+        Its values are the start of the fit, its validation gives the bounds.
     track : Track
         See `chutelab.studies.measured.read`.
     keys : sequence of str
         Any numbers of the scene, such as ``plate.restitution``, and of the placement: ``t0``
-        (looked for everywhere, not only near its start), ``scale``, ``origin.x``, ``origin.y``.
+        (searched everywhere, not only near its start), ``scale``, ``origin.x``, ``origin.y``.
     robust : bool
         Give points that lie far off less weight (soft L1 instead of squares).
 
     Raises
     ------
     MeasuredError
-        If a key cannot be fitted, too few points lie within the simulated time, the points cannot
-        tell the parameters, or nothing is found.
+        If a key cannot be fitted, too few points lie within the simulated time, the points do not
+        determine the parameters, or no minimum is found.
     SceneError
         If the scene cannot be run.
     MissingLibraryError
@@ -342,10 +345,10 @@ def fit(scene: AnyScene, track: Track, keys: Sequence[str], *, robust: bool = Fa
 
 @dataclass(frozen=True, eq=False)
 class _Minimum:
-    """Where a descent came to rest, and what it says of the residuals there.
+    """The end of a descent, with the statistics of its residuals.
 
-    `cost` is their mean square, m²; `threshold` the residual, m, from which on a robust fit
-    believes a point less.
+    `cost` is their mean square, m²; `threshold` the residual, m, from which on a robust fit gives a
+    point less weight.
     """
 
     values: Floats
@@ -358,7 +361,7 @@ class _Minimum:
 def _descended(problem: Problem, values: Floats, *, robust: bool) -> _Minimum | None:
     """Return the minimum below some values, with the points that lie within its simulated time.
 
-    None if it lies so far off that hardly any do.
+    None if it is so far off that hardly any do.
     """
     parameters = problem.parameters
     threshold, settled = 1.0, False
@@ -367,7 +370,7 @@ def _descended(problem: Problem, values: Floats, *, robust: bool) -> _Minimum | 
         if used.sum() < LEAST:
             return None
         problem.use(used)
-        # Its own derivatives would take steps that the scene refuses, and no other way then.
+        # SciPy's own derivatives would take steps that the scene refuses, and stop there.
         solved = _scipy("optimize").least_squares(
             problem.tried,
             values,
@@ -385,7 +388,8 @@ def _descended(problem: Problem, values: Floats, *, robust: bool) -> _Minimum | 
         # Clamp; 1.0 means off.
         deviation = result.MAD * float(np.median(np.abs(left)))
         previous, threshold = threshold, min(max(TUNING * deviation, 1e-9), 0.99)
-        # From the third turn on points only leave: one at the very end could come and go forever.
+        # From the third round on points are only removed, as one at the very end could come and go
+        # forever.
         within = inside(*problem.run(values)) & (used | (turn < 2))
         settled = bool((within == used).all()) and bool(solved.success)
         if settled and (not robust or abs(threshold - previous) < 1e-3 * threshold):
@@ -395,10 +399,10 @@ def _descended(problem: Problem, values: Floats, *, robust: bool) -> _Minimum | 
 
 
 def _judged(problem: Problem, best: _Minimum, before: Residuals, *, robust: bool) -> Fit:
-    """Return the result with its uncertainties; refuse what the points cannot tell.
+    """Return the result with its uncertainties; refuse undetermined parameters.
 
-    `scipy.optimize.curve_fit` has the covariance of a plain fit, and neither that of a robust one
-    nor a word about parameters that cannot be told apart.
+    `scipy.optimize.curve_fit` has the covariance of a plain fit, but not that of a robust one, and
+    no warning about parameters that cannot be separated.
     """
     parameters, values = problem.parameters, best.values
     derivatives = problem.derivatives(values)

@@ -34,7 +34,7 @@ SEPARATORS: Final = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "space
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?")
 
 _EMPTY: Final = ("", "nan", "null", "na", "n/a", "-", "--")
-"""What stands for no value, in small letters."""
+"""Cells that mean no value, in small letters."""
 
 
 def lines_of(path: Path) -> list[str]:
@@ -104,12 +104,12 @@ _POSITION: Final = re.compile(r"[1-9]\d{0,5}")
 _WITH_UNIT: Final = re.compile(r"(.*\S)\s*[(\[]\s*([a-zA-Z]+)\s*[)\]]")
 
 _HEADER_WITHIN: Final = 100
-"""Lines in which the names of the columns are looked for."""
+"""The names of the columns are searched in so many lines."""
 
 
 @dataclass(frozen=True)
 class _Columns:
-    """Where a track's t, x and y are: cell numbers of a line of `width`, and their units."""
+    """Columns of a track's t, x and y in a line of `width` cells, and their units."""
 
     name: str
     cells: dict[str, int]
@@ -118,7 +118,7 @@ class _Columns:
 
 
 def find(name_or_path: str | Path) -> Path:
-    """Return the file meant: one that exists, or else the shipped track of this name.
+    """Return an existing file, or else the shipped track of this name.
 
     Raises a `MeasuredError` if there is neither.
     """
@@ -147,7 +147,7 @@ def read(
 ) -> Track:
     """Read a track from a table with the columns t, x and y; others are ignored.
 
-    A table that names no columns, and has just these three, will do.
+    A table without names of columns is accepted if it has just these three.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def read(
     track
         Which one, of a file that holds several.
     columns
-        Which are t, x and y: names, or numbers from 1; by default those that are called so.
+        Columns of t, x and y: names, or numbers from 1; by default those with these names.
     fps
         Frames per second, of a table without times: each line is a frame, also one without a
         position. With three `columns` the first is the number of the frame.
@@ -227,7 +227,7 @@ def read(
 
 
 def _header(source: Path, lines: Sequence[str], keys: Sequence[str]) -> tuple[int, str]:
-    """Return the index of the line with the columns' names, -1 for none, and the separator."""
+    """Return the index of the line with the columns' names (-1 for none), and the separator."""
     best: tuple[int, set[str]] = (0, set())
     for index, line in enumerate(lines[:_HEADER_WITHIN]):
         for separator in SEPARATORS:
@@ -265,7 +265,7 @@ def _numeric(cells: Sequence[str]) -> bool:
 def _chosen(
     source: Path, lines: Sequence[str], keys: Sequence[str], columns: Sequence[str | int]
 ) -> tuple[int, str, _Columns]:
-    """Return the line above the numbers, -1 for none, the separator, and what was chosen."""
+    """Return the line above the numbers (-1 for none), the separator, and the chosen columns."""
     wanted = [str(column).strip().lower() for column in columns]
     said, asked = ",".join(map(str, columns)), ",".join(keys)
     if len(wanted) != len(keys) or len(set(wanted)) < len(wanted):
@@ -277,7 +277,7 @@ def _chosen(
             if max(numbers, default=0) >= len(cells):
                 continue
             if len(numbers) == len(keys):
-                # What stands above the first line of numbers may name units.
+                # The line above the first line of numbers may name units.
                 picked = [cells[n] for n in numbers]
                 if not _numeric(picked if any(picked) else cells):
                     continue
@@ -353,7 +353,7 @@ def _rows(
 ) -> tuple[list[tuple[float, ...]], list[int], int]:
     """Return time, x and y of each point, their lines, and how many lines have no position.
 
-    In place of a time that is in no column stands the number of the line of numbers, from 0.
+    Without a column of times, the time is the number of the line of numbers, from 0.
     """
     width, frame = columns.width, -1
     points: list[tuple[float, ...]] = []

@@ -1,4 +1,4 @@
-"""`Fit`: what a fit found, what makes it less certain than its uncertainties say, its files."""
+"""`Fit`: the result of a fit, reasons to doubt its uncertainties, its files."""
 
 from __future__ import annotations
 
@@ -22,27 +22,26 @@ MAD = 1.4826
 
 CORRELATED = 0.9
 BENT = 0.2
-"""Relative change of the Jacobian over one uncertainty from which on it is no straight line."""
+"""With a larger relative change of the Jacobian over one uncertainty the fit is not linear."""
 ALIKE = 0.4
-"""Correlation of neighbouring residuals that chance does not give in a film of some tens of
-points."""
+"""Correlation of neighbouring residuals that is not chance in a film of some tens of points."""
 FEW = 10
-"""Points from which on that can be told."""
+"""Least number of points for this test."""
 FAR = 6.0
 """Robust standard deviations; one point in 60 million lies so far off by chance."""
 NAMED = 5
-"""Points that are named one by one."""
+"""Most points that are named one by one."""
 
 
 FAR_CLOSER = 10.0
-"""A t0 is advised if it makes the residuals so many times smaller."""
+"""Another t0 is advised if it makes the residuals so many times smaller."""
 ASTRAY = 3.0
-"""Distance of the points from the simulated track, in sizes of that, from which on their placement
-is doubted."""
+"""If the points are further from the simulated track than this, in sizes of the track, their
+placement is doubted."""
 
 
 def advice(found: Residuals) -> str:
-    """Say what is probably wrong with how the points were placed, "" if nothing stands out."""
+    """Return what is probably wrong with the placement of the points, "" if nothing."""
     off = float(np.median(np.hypot(*found.values[found.used].T)))
     size = float(np.ptp(found.recording.track(0)["position"], axis=0).max())
     if off > ASTRAY * size:
@@ -68,13 +67,13 @@ def advice(found: Residuals) -> str:
 
 
 def notes(fit: Fit, bent: Floats, *, settled: bool) -> Iterator[str]:
-    """Yield what should be said beside a result.
+    """Yield remarks on a result.
 
     `bent`, (p,), is by how much the response to each parameter changes within its uncertainty,
     relatively; `settled`, whether the fit ended with the same points within the simulated time.
     """
     if doubt := advice(fit.after):
-        # The other notes would mean nothing then.
+        # The other notes would be meaningless then.
         yield doubt
         return
     for key, parameter, value, error in zip(
@@ -116,7 +115,7 @@ def notes(fit: Fit, bent: Floats, *, settled: bool) -> Iterator[str]:
 
 
 def alike(left: Floats) -> bool:
-    """Tell whether residuals (2 n,), x and y of each point in turn, are more than noise."""
+    """Whether residuals (2 n,), x and y of each point in turn, are more than noise."""
     points = left.reshape(-1, 2)
     return len(points) >= FEW and _neighbours(points) > ALIKE
 
@@ -131,30 +130,30 @@ def _neighbours(left: Floats) -> float:
 class Parameter:
     """A number that a fit may change."""
 
-    # what it is called: a full path in the scene as it was given, or a key of `placements`; "" for
-    # the unit of a pure number
+    # its name: a full path in the scene as it was given, or a key of `placements`; "" for the unit
+    # of a pure number
     key: str
     unit: str
     start: float  # its value in the scene or the placement
-    # the least and the largest value that are searched: those that are allowed, but not below
-    # `SMALLEST` of the start where 0 is not
+    # range of the search: the allowed values, but not below `SMALLEST` times the start if 0 is not
+    # allowed
     low: float
     high: float
 
     @property
     def size(self) -> float:
-        """By how much it may be expected to change: its own size, but not next to nothing."""
+        """Typical size of its change: its own size, but not almost 0."""
         return max(abs(self.start), 0.1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit(Shown):
-    """What a fit found.
+    """Result of a fit.
 
     Attributes
     ----------
     parameters : tuple of Parameter
-        What was fitted: key, unit, start and bounds.
+        The fitted parameters: key, unit, start and bounds.
     values, errors : ndarray, shape (p,)
         The best values, and their standard uncertainties (one standard deviation).
     low, high : ndarray, shape (p,)
@@ -172,7 +171,7 @@ class Fit(Shown):
     robust : bool
         Whether points that lie far off were given less weight.
     notes : tuple of str
-        What makes the result less certain than it looks.
+        Reasons why the result is less certain than it looks.
 
     Notes
     -----

@@ -25,7 +25,7 @@ LARGEST: Final = 1e9
 
 @dataclass(frozen=True)
 class Placement:
-    """How the numbers of a file become positions in the world and times of the simulation.
+    """Transformation of a file's numbers to positions in the world and times of the simulation.
 
     x = scale (x_file - origin_x), y = ± scale (y_file - origin_y), t = t_file - t0.
 
@@ -81,7 +81,7 @@ class Track(Shown):
     lines : ndarray, shape (P,)
         Line of the file that each point stands in, from 1.
     placement : Placement
-        How they lie in the world.
+        Their placement in the world.
     skipped : int
         Lines without a position, which were left out.
     """
@@ -130,7 +130,7 @@ class Track(Shown):
         return replace(self, placement=replace(self.placement, **changes))
 
     def said(self) -> str:
-        """Return what it is in one sentence."""
+        """Describe it in one sentence."""
         named = f'"{self.name}"' if self.name else "track"
         text = f"{named} of {self.source}: {len(self)} points"
         if self.skipped:
@@ -145,10 +145,10 @@ class Track(Shown):
 
 
 ROUNDING = 1e-9
-"""s; a time this little before release or after the end is meant to be on it."""
+"""s; a time this close to release or end counts as on it."""
 
 LEAST = 3
-"""Points without which there is nothing to compare."""
+"""Least number of points for a comparison."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -162,7 +162,8 @@ class Residuals(Shown):
     recording : Recording
         The simulation.
     simulated : ndarray, shape (P, 2)
-        Where particle 0 is at the times of the points, m; NaN before its release and after its end.
+        Positions of particle 0 at the times of the points, m; NaN before its release and after its
+        end.
     """
 
     track: Track
@@ -187,17 +188,17 @@ class Residuals(Shown):
 
     @property
     def mean(self) -> tuple[float, float]:
-        """Mean residuals in x and in y, m: how far the points lie off as a whole."""
+        """Mean residuals in x and in y, m: the offset of the points as a whole."""
         x, y = np.mean(self.values[self.used], axis=0).tolist()
         return x, y
 
     @property
     def worst(self) -> int:
-        """Index of the point that lies farthest from where it should be."""
+        """Index of the point with the largest residual."""
         return int(np.nanargmax(np.hypot(*self.values.T)))
 
     def left_out(self) -> str:
-        """Say which points lie outside the simulated time, "" if none does."""
+        """Name the points outside the simulated time, "" if there are none."""
         begin, end = ends(self.recording)
         parts = []
         for outside, where in (
@@ -268,7 +269,7 @@ def inside(recording: Recording, track: Track) -> Bools:
 
 
 def run(scene: Scene) -> Recording:
-    """Simulate what particle 0 does; of a stream that ignores each other, only particle 0."""
+    """Simulate the motion of particle 0; without the others if they do not interact."""
     if scene.count > 1 and not scene.crowded:
         scene = scene.alone()
     return simulate(scene)
@@ -281,7 +282,7 @@ def ends(recording: Recording) -> tuple[float, float]:
 
 
 def follow(recording: Recording, times: Floats) -> Floats:
-    """Return positions (T, 2) of particle 0 at times (T,), straight on before and after its track.
+    """Return positions (T, 2) of particle 0 at times (T,), extrapolated linearly beyond its track.
 
     A fit moves release and end a little; with NaN there, its sum of squares would jump.
     """
@@ -299,18 +300,18 @@ def follow(recording: Recording, times: Floats) -> Floats:
 
 
 STEPS = 2000
-"""Moments tried; a fit from the best one finds what is between two."""
+"""Number of times tried; a fit from the best one refines it."""
 
 POINTS = 200
-"""Points that are looked at, evenly spread; no more are needed for this."""
+"""Most points that are used for this, evenly spread."""
 
 
 def best_t0(recording: Recording, track: Track) -> float:
     """Return the t0 (s, in the time of the file) that brings track and simulation closest.
 
-    Each point counts the square of its distance, but no more than the size of the track, and a
-    little more than that where there is no simulation: so points cannot be hidden before the
-    release or after the end. The t0 that the track has is kept if no other is better.
+    The sum has the square of each point's distance, limited to the size of the track, and a little
+    more than that outside the simulated time, so that it is not better to move points before the
+    release or after the end. The track's t0 is kept if no other is better.
     """
     begin, end = ends(recording)
     some = slice(None, None, 1 + len(track) // POINTS)
@@ -318,7 +319,7 @@ def best_t0(recording: Recording, track: Track) -> float:
     reach = float(np.ptp(position, axis=0).max())
     now = track.placement.t0
     tried = np.append(np.linspace(seconds[0] - end, seconds[-1] - begin, STEPS), now)
-    # Linear between so many samples is far closer than the points lie.
+    # Linear interpolation between so many samples is far more accurate than the points.
     moments = np.linspace(begin, end, 4 * STEPS)
     path = follow(recording, moments)
     clock = seconds - tried[:, None]

@@ -7,12 +7,12 @@
 >>> len(swept), swept.columns["landing.vx.mean"].round(3).tolist()
 (4, [0.0, -2.0, 0.0, -4.0])
 
-`sweep` has the work done by this process, by processes of this computer, or by a Dask cluster, and
-gathers what came of each variant. SciPy, pyarrow, Dask and pandas are imported when needed.
+`sweep` runs variants here, in other processes, or on a Dask cluster, and collects the results.
+SciPy, pyarrow, Dask and pandas are imported when needed.
 
-- `plan`: what is to be varied, looked at before anything runs; blocks of variants, run.
-- `rows`: what a row holds, read off a recording; `Sweep`, and CSV and Parquet files.
-- `part`: the file of the finished rows of a sweep that is not finished.
+- `plan`: checks what is to be varied before anything runs; runs blocks of variants.
+- `rows`: the columns of a row, computed from a recording; `Sweep`, and CSV and Parquet files.
+- `part`: the file with the finished rows of an unfinished sweep.
 """
 
 from __future__ import annotations
@@ -72,27 +72,27 @@ __all__ = [
 Job = tuple[int, Any]
 
 ATTEMPTS: Final = 3
-"""Times in a row that all processes may die without finishing anything."""
+"""How often in a row all processes may die without finishing a job."""
 
 PATIENCE: Final = 10.0
 """s that a scheduler may take to answer."""
 
 
 LETS_GO: Final = 1.0
-"""s, at most, that a pool may take to cancel what it has not begun."""
+"""Most s that a pool may take to cancel jobs that have not begun."""
 
 ADDRESS: Final = re.compile(r"(\w+://)?[^\s:/]+:\d{1,5}")
 """A host and a port."""
 
 
 class LostWorkersError(RuntimeError):
-    """All workers are gone; the text says what to do."""
+    """All workers are lost; the text says what to do."""
 
 
 class Crew:
     """An executor, how many jobs it has at a time, and how to get a new one if it breaks.
 
-    `alive` is called while nothing comes back; it raises an error if nothing can any more. Without
+    `alive` is called while no result comes; it raises an error if none can come any more. Without
     an executor this process does the work.
 
     `concurrent.futures` does the work. What it lacks: `Executor.map` takes all jobs at once (2.3 kB
@@ -113,7 +113,7 @@ class Crew:
     def results(
         self, work: Callable[[Any], Any], jobs: Iterable[Job]
     ) -> Generator[tuple[int, Any], None, None]:
-        """Yield the number of each job and what came of it, as they are finished.
+        """Yield the number and result of each job, as they are finished.
 
         A `LostWorkersError` if processes keep dying, or a cluster is lost.
         """
@@ -130,7 +130,7 @@ class Crew:
     def _results(
         self, work: Callable[[Any], Any], jobs: Iterable[Job], running: dict[Future[Any], int]
     ) -> Iterator[tuple[int, Any]]:
-        """Yield what the executor's processes have done; `running` has what they have not."""
+        """Yield the finished jobs of the executor's processes; `running` has the others."""
         assert self.executor is not None
         left, deaths = iter(jobs), 0
         given: dict[int, Any] = {}  # jobs that are not done, by number
@@ -199,7 +199,8 @@ def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
         yield team
     except BaseException:
         if team.executor is not None:
-            # Its thread fails at a job that is cancelled when its process dies: jobs go first.
+            # Cancel jobs first: the pool's thread fails at a job that is cancelled when its process
+            # dies.
             gone = Event()
             with suppress(RuntimeError), _without_ctrl_c():
                 team.executor.submit(int).add_done_callback(lambda _: gone.set())
@@ -215,7 +216,7 @@ def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
 
 @contextmanager
 def _without_ctrl_c() -> Iterator[None]:
-    """Let Ctrl-C wait. Processes that begin meanwhile never get it, not even while they import.
+    """Delay Ctrl-C; processes that begin meanwhile never get it, not even while they import.
 
     A terminal sends it to all of its processes; here the first one ends the others.
     """
@@ -275,9 +276,9 @@ def _cluster(address: str) -> Iterator[Crew]:
 
 
 def _check_same_version(client: Any, address: str) -> None:
-    """Refuse workers whose chutelab is another version: their rows would not be those of this one.
+    """Refuse workers with another version of chutelab, whose rows could differ.
 
-    A worker that cannot say its version has none, or one from before it could be asked.
+    A worker that does not report its version has no chutelab, or one too old for that.
     """
     own = own_version()
     others = {
@@ -296,7 +297,7 @@ def _check_same_version(client: Any, address: str) -> None:
 
 
 def _ask(dask: ModuleType, address: str) -> None:
-    """Refuse an address at which no Dask scheduler answers, in time.
+    """Refuse an address at which no Dask scheduler answers in time.
 
     A client waits for ever for a server that accepts a connection and sends nothing, and prints a
     traceback of other faults after 20 s. The thread that asks stops in time too: as long as it
@@ -359,7 +360,7 @@ def sweep(
         Values by key; a grid of all combinations, whose last key runs fastest. With `sample`, the
         two ends of a range by key.
     sample : int, optional
-        Draw so many samples from the ranges instead; needs SciPy.
+        Draw so many samples from the ranges instead of a grid; needs SciPy.
     design, seed : {"lhs", "sobol"}, int
         Latin hypercube or Sobol points, and the seed.
     engine : {"auto", "exact", "contact", "pymunk"}, optional
@@ -377,12 +378,12 @@ def sweep(
     Returns
     -------
     Sweep
-        Also of variants that cannot be, or miss: with the reason.
+        With a row for impossible variants and misses, too, with the reason.
 
     Raises
     ------
     InputError
-        If the variants cannot be made so; before anything runs.
+        If the variants are invalid; before anything runs.
 
     Examples
     --------
@@ -443,7 +444,7 @@ def sweep_to(
 def _work(
     plan: Plan, team: Crew, done: Container[int], progress: Progress | None
 ) -> Iterator[tuple[int, Columns]]:
-    """Yield where blocks begin, and their rows, but for those that are done."""
+    """Yield the beginnings of blocks and their rows, without finished ones."""
     size = plan.begins.step
     begins = [begin for begin in plan.begins if begin not in done]
     jobs = ((begin, plan.block(begin, begin + size)) for begin in begins)

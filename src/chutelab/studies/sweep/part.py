@@ -1,13 +1,13 @@
-"""The file of finished rows, which lies beside the one that a sweep is to write until all are.
+"""The file of finished rows, kept beside a sweep's file until all rows are finished.
 
-It is locked while the sweep runs, which tells a sweep that runs from one that was interrupted.
-It has lines of JSON. The first one is about the sweep, and has the process that writes. Each other
-one has the number that a block of rows begins with, the rows as text, and the SHA-256 of what
-stands in all lines up to there: a line that is changed, doubled, moved or missing is found. It is
-no protection against rows whose hashes were computed for them.
+It is locked while the sweep runs, which distinguishes a running sweep from an interrupted one. It
+has lines of JSON. The first one describes the sweep and the process that writes. Each other one has
+the first number of a block of rows, the rows as text, and the SHA-256 of all lines up to there, so
+that a line that is changed, doubled, moved or missing is found. It does not protect against forged
+rows with new hashes.
 
-SQLite would lock and sync as well. It could not name the line that was changed or the process that
-still writes, leaves a journal beside the file when it is killed, and needs the hashes all the same.
+SQLite would lock and sync as well. But it could not name the changed line or the process that still
+writes, leaves a journal beside the file when it is killed, and would need the hashes, too.
 """
 
 from __future__ import annotations
@@ -49,13 +49,13 @@ WORDS: Final = {
     "engine": "--engine",
     "repeat": "--repeat",
 }
-"""What a sweep can differ in, for people."""
+"""Properties in which sweeps can differ, in words."""
 
 LONGEST: Final = 2**26
 """Bytes of a line: twice those of the largest block, all of whose rows have a long reason."""
 
 INTERVAL: Final = 0.5
-"""s from one fsync to the next at least: an fsync takes milliseconds, and so may a block."""
+"""Least time between two fsyncs, s: an fsync takes milliseconds, as may a block."""
 
 BEYOND: Final = 2**31 - 2
 """Byte that is locked on Windows, beyond the file's end: a locked byte cannot be read."""
@@ -70,8 +70,8 @@ def part_of(out: Path) -> Path:
 def unfinished(out: Path, plan: Plan, *, resume: bool) -> Iterator[Part]:
     """Keep the finished rows of a sweep until all are; with `resume`, from those that are there.
 
-    Raises an `InputError` if the file is of another sweep, not as it was written, there although
-    not to `resume`, of a sweep that still runs, or cannot be written.
+    Raises an `InputError` if the file belongs to another sweep, was changed, exists without
+    `resume`, belongs to a running sweep, or cannot be written.
     """
     part, complete = Part(part_of(out), plan), False
     try:
@@ -92,11 +92,11 @@ class Part:
         self.path, self._plan = path, plan
         self._chain = hashlib.sha256()
         self._synced = -INTERVAL
-        self._ours = False  # not what an earlier sweep, or another program, left
+        self._ours = False  # not what an earlier sweep or another program left
         self._file = _locked(path)
 
     def take_up(self, *, resume: bool) -> None:
-        """Read what is there, and get ready to add to it."""
+        """Read the existing rows, and prepare to add to them."""
         samples = self._plan.samples
         head = {
             "format": FORMAT,
@@ -108,7 +108,7 @@ class Part:
             "repeat": self._plan.repeat,
         }
         start = json.dumps(head).encode()[:-1]
-        # As long for every process: a resumed sweep writes over it.
+        # Of equal length for every process, since a resumed sweep writes over it.
         mine = start + b', "process": %10d}\n' % os.getpid()
         self._chain.update(start)
         first = self._file.readline(LONGEST)
@@ -185,7 +185,7 @@ class Part:
     def close(self, *, complete: bool) -> None:
         """Close the file and unlock it; remove it if the sweep is complete, or it has no rows."""
         remove = complete or (self._ours and not self.done)
-        with suppress(OSError):  # What cannot be written was said before.
+        with suppress(OSError):  # Errors in writing were reported before.
             if not remove:
                 self._sync()
             elif sys.platform != "win32":  # Before it is unlocked; Windows removes no open file.
@@ -233,7 +233,7 @@ def _locked(path: Path) -> BinaryIO:
             except OSError:
                 pass  # There are file systems without locks.
             file.seek(0)
-            # Its owner may have removed it just now: then it is made anew.
+            # Its owner may have removed it just now; then make it again.
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(number), path.stat()):
                     stack.pop_all()

@@ -1,8 +1,8 @@
-"""What is to be swept, and blocks of it run: which keys, over which values, in which order.
+"""The plan of a sweep: keys, values and their order; blocks of variants and their runs.
 
 Values are grids, or samples of several ranges at once: Latin hypercube or Sobol points. Variants
-that differ in plain numbers only run many at once: validating and building, which are slow one by
-one, are done on arrays too. What does not fit is run alone: that is never wrong, only slower.
+that differ only in plain numbers run many at once, and are validated and built as arrays, too,
+which is slow one by one. Others run alone, which gives the same results, only slower.
 """
 
 from __future__ import annotations
@@ -54,10 +54,10 @@ TOGETHER: Final = 6144
 """Particles of the variants in a block that goes through the exact engine at once."""
 
 EXACT: Final = 16
-"""The same of variants that go one by one, a millisecond each."""
+"""The same for variants that run one by one, a millisecond each."""
 
 STEPPED: Final = 1
-"""The same of variants that are stepped: each may take seconds."""
+"""The same for stepped variants, which may take seconds each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +76,12 @@ class Block:
 
 
 def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
-    """Validate the variants of a block, whose keys are plain numbers.
+    """Validate the variants of a block whose keys are plain numbers.
 
-    A value is judged by its key, once for each. Rules between keys judge one variant for each
-    combination of the values that they ask for; other keys cannot change what they say. Returned
-    are one of the sound variants (None if there is none), the numbers of all of them, and what is
-    wrong with each of the others.
+    Each value is checked once for its key. Rules between keys check one variant for each
+    combination of the values that they use; other keys cannot change the result. Returned are one
+    valid variant (None if there is none), the numbers of all valid ones, and the faults of the
+    others.
     """
     values = block.values
     good = np.stack([accepted(*column) for column in zip(block.paths, values.T, strict=True)]).T
@@ -93,7 +93,7 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
             np.hstack([telling, good]), axis=0, return_index=True, return_inverse=True
         )
         fair = [sound[row] and not judge.finds(block.settings(row)) for row in first.tolist()]
-        # A rule asks for all of a point, of which a coordinate may vary.
+        # A rule uses a whole point, of which one coordinate may vary.
         more = [
             any(f"{path}[".startswith(f"{key}[") for key in judge.asked) for path in block.paths
         ]
@@ -114,16 +114,16 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
 
 
 def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording | str]]:
-    """Run the variants of a block: many at once where that can be, else one by one.
+    """Run the variants of a block: many at once if possible, else one by one.
 
-    Many at once, a particle has a machine of its own; numbers agree with those of the variant alone
-    to 1e-12. `apart` has all of them run one by one.
+    If many run at once, each particle has its own machine; numbers agree with those of the variant
+    alone to 1e-12. `apart` runs all of them one by one.
 
     Yields
     ------
     which, found
-        Rows of the block, (N,), and their recording, which breaks no law: of one variant, or of a
-        family. Or, as text, why they have none.
+        Rows of the block, (N,), and their recording, which breaks no law, for one variant or a
+        family. Or the reason, as text, why they have none.
     """
     which = np.arange(len(block.values))
     template = None
@@ -156,7 +156,7 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
             if not recording.laws:
                 yield which, recording
                 continue
-        # Those that do not get through, or break a law, are found by halving.
+        # Variants that fail, or break a law, are found by halving.
         halves = np.array_split(which, 2) if len(which) > 1 else []
         groups += halves
         left += [] if halves else which.tolist()
@@ -169,14 +169,14 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
 
 
 STEPPED_KEYS: Final = {"air_density", "gravity_deg", "turn", "shake", "travel", "count"}
-"""Parts of keys that no family varies: they are the contact engine's, or the number of particles
-is."""
+"""Parts of keys that cannot vary in a family: they need the contact engine, or change the number of
+particles."""
 
 
 def are_family(scene: Scene, paths: Sequence[str], engine: str | None) -> bool:
-    """Tell whether scenes that differ in some plain numbers go through the exact engine at once.
+    """Whether scenes that differ in some plain numbers run at once in the exact engine.
 
-    Their particles meet no other, and where they are several all are of one kind.
+    Their particles do not interact, and if there are several, all are of one kind.
     """
     stepped = scene.crowded or scene.clings or scene.air_density > 0.0
     stepped |= (engine or scene.run.engine) in ("contact", "pymunk")
@@ -187,7 +187,7 @@ def are_family(scene: Scene, paths: Sequence[str], engine: str | None) -> bool:
 
 
 def alone(scene: Scene, engine: str | None = None) -> Recording | str:
-    """Return the recording of a scene, or why there is none, or none that can be believed."""
+    """Return the recording of a scene, or why there is no (reliable) one."""
     try:
         recording = judged(scene, engine=engine)
     except SceneError as error:
@@ -198,19 +198,19 @@ def alone(scene: Scene, engine: str | None = None) -> Recording | str:
 
 
 def row_of(scene: Scene) -> Columns:
-    """Simulate a scene and return its row; if it cannot be run, one that says why."""
+    """Simulate a scene and return its row; if it cannot be run, a row with the reason."""
     found = alone(scene)
     return empty(1, found) if isinstance(found, str) else rows(found)
 
 
 def seeds_of(block: Block) -> Iterator[Block]:
-    """Yield the block with each of its seeds; all variants have the same ones."""
+    """Yield the block with each of its seeds, the same for all variants."""
     for number in range(block.repeat):
         yield replace(block, scene=reseeded(block.scene, number), repeat=1)
 
 
 def swept(block: Block, *, apart: bool = False) -> Columns:
-    """Return the rows of a block, see `runs`; of several seeds means and their errors."""
+    """Return the rows of a block, see `runs`; with several seeds means and their errors."""
     if block.repeat > 1:
         return averaged([swept(seed, apart=apart) for seed in seeds_of(block)])
     every = empty(len(block.values))
@@ -233,7 +233,7 @@ class Plan:
     scene: Scene  # what is varied
     # keys, and the values of each in a grid, or the ends of what samples are drawn from
     varies: tuple[Vary, ...]
-    quantities: tuple[Quantity, ...]  # what the K keys are
+    quantities: tuple[Quantity, ...]  # descriptions of the K keys
     engine: str | None  # overrides run.engine
     # (N, K) values of the keys; None for the grid, in which the last key runs fastest
     samples: Floats | None
@@ -257,7 +257,7 @@ class Plan:
 
     @property
     def begins(self) -> range:
-        """The numbers that blocks begin with; they depend on the plan only, so it can resume."""
+        """First numbers of the blocks; they depend only on the plan, so that it can resume."""
         stream, paths = self.scene.stream, [quantity.path for quantity in self.quantities]
         one = stream.count == 1 and "stream.count" not in self.keys
         wanted = self.engine or self.scene.run.engine
@@ -293,12 +293,12 @@ def planned(
     engine: str | None = None,
     repeat: int = 1,
 ) -> Plan:
-    """Look whether a sweep can be done, before anything runs; takes what `sweep` does.
+    """Check a sweep before anything runs; takes the arguments of `sweep`.
 
     Raises
     ------
     InputError
-        If a key cannot be varied so, there is too much, or samples cannot be drawn so.
+        If a key cannot be varied, there are too many variants, or samples cannot be drawn.
     ValueError
         If there is no engine of that name.
     """
@@ -328,7 +328,7 @@ def planned(
 def _samples(
     varies: Sequence[Vary], about: Sequence[Quantity], count: int, design: str, seed: int
 ) -> Floats:
-    """Draw samples, (count, K); whole numbers with both ends, all equally likely."""
+    """Draw samples, (count, K); whole numbers include both ends, all equally likely."""
     if design not in DESIGNS:
         raise InputError(f"--design {design}: one of {', '.join(DESIGNS)}")
     if not 1 <= count <= MOST_VARIANTS:
@@ -338,7 +338,7 @@ def _samples(
     qmc = library("scipy.stats.qmc", "--sample needs SciPy", "design")
     sampler = getattr(qmc, DESIGNS[design])(d=len(varies), seed=np.random.default_rng(seed))
     if design == "sobol":
-        # Of a power of two points the first ones: SciPy warns of all other numbers.
+        # Take the first of a power of two points, as SciPy warns of all other numbers.
         shares = sampler.random_base2((count - 1).bit_length())[:count]
     else:
         shares = sampler.random(count)

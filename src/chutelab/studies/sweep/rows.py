@@ -1,8 +1,8 @@
-"""The rows of a sweep: what each holds, how it is read off a recording, their table and its files.
+"""The rows of a sweep: columns, computation from a recording, table and files.
 
-A recording is of one variant with all its particles, or of a family of many: V variants of M
-particles. Both go through the same operations, so that a row does not depend on which it came from.
-Files hold text that gives every bit back, in CSV or Parquet, and are written whole or not at all.
+A recording has one variant with all its particles, or a family: V variants of M particles. Both go
+through the same operations, so that a row does not depend on that. Files, CSV or Parquet, keep
+every bit, and are written whole or not at all.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ Rows = Mapping[str, NDArray[Any]]
 Columns = dict[str, NDArray[Any]]
 
 TOUCHES: Final = "touches"
-"""The column that says which surfaces the particles meet, see `touches`; "" without a run."""
+"""The column with the surfaces that particles meet, see `touches`; "" without a run."""
 
 REASON: Final = "reason"
-"""The column that says why there are no numbers, or not all; "" otherwise."""
+"""The column with the reason why numbers are missing; "" if none are."""
 
 ERROR: Final = ".error"
-"""What the name of a column ends with that is the standard error of the mean over seeds."""
+"""Ending of names of columns with the standard error of the mean over seeds."""
 
 TEXTS: Final = (TOUCHES, REASON)
 """The columns of words, which come last."""
 
 
 def no_column(name: str) -> str:
-    """Say which columns of numbers there are, or what is called otherwise in a sweep.
+    """Return which columns of numbers there are, or the name of a quantity in a sweep.
 
     >>> no_column("landing.x")
     'landing.x is called landing.x.mean now: in a run landing.x is of one particle'
@@ -66,7 +66,7 @@ def no_column(name: str) -> str:
 
 
 class Named(dict[str, NDArray[Any]]):
-    """Columns by name; asked for one that is not there, it says what it is called."""
+    """Columns by name; the error for an unknown one has its name in a sweep."""
 
     def __missing__(self, name: str) -> NDArray[Any]:
         """Raise a KeyError that says which columns there are."""
@@ -74,22 +74,22 @@ class Named(dict[str, NDArray[Any]]):
 
 
 def empty(count: int, why: str = "") -> Columns:
-    """Return rows without numbers, and why they have none."""
+    """Return rows without numbers, with the reason."""
     texts = {TOUCHES: "", REASON: why}
     found: Columns = {name: np.full(count, np.nan) for name in COLUMNS}
     return found | {name: np.full(count, text, dtype=object) for name, text in texts.items()}
 
 
 def joined(parts: Sequence[Mapping[str, NDArray[Any]]]) -> Columns:
-    """Put rows below each other."""
+    """Concatenate rows."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def averaged(parts: Sequence[Columns]) -> Columns:
     """Return the means of rows over seeds, their standard errors, and the words of most seeds.
 
-    A seed without a value does not count; of fewer than two values there is no error. Reasons say
-    of how many seeds they are.
+    A seed without a value does not count; for fewer than two values there is no error. Reasons have
+    the number of their seeds.
     """
     names = [name for name in parts[0] if name not in TEXTS]
     found = {name: mean_and_error([part[name] for part in parts]) for name in names}
@@ -111,7 +111,7 @@ def averaged(parts: Sequence[Columns]) -> Columns:
 def mean_and_error(values: ArrayLike) -> tuple[Floats, Floats]:
     """Return the mean over seeds, the first axis, and its standard error s / √n.
 
-    What is NaN does not count; the error of fewer than two values is NaN.
+    NaN does not count; the error of fewer than two values is NaN.
 
     >>> mean_and_error([[1.0], [2.0], [3.0], [float("nan")]])
     (array([2.]), array([0.57735027]))
@@ -133,7 +133,7 @@ FATES = {
     "settled": "came to rest elsewhere",
     "exit": "left the scene",
 }
-"""What became of a lone particle that did not arrive, by why its track ended."""
+"""Fate of a lone particle that did not arrive, by the reason of its end."""
 
 
 def rows(recording: Recording, variants: int = 1) -> Columns:
@@ -171,31 +171,31 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
 
 
 LONGEST: Final = 6
-"""Surfaces that are named: what is thrown to and fro longer goes by the same name."""
+"""Most surfaces that are named; longer sequences with the same beginning have the same name."""
 
 FIELDS: Final = "particle", "surface", "kind"
-"""Of an event, by which ways are told."""
+"""Fields of an event that define a sequence of surfaces."""
 
 NOTHING: Final = "nothing"
-"""What a particle touches that meets no surface."""
+"""Word for a particle that meets no surface."""
 
 RARE: Final = 0.02
-"""Share up to which a way of few is not told: of the particles of a crowd, of uncertain samples."""
+"""A sequence is not reported for a smaller share of a crowd or of uncertain samples."""
 
 
 def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
-    """Return which surfaces the particles of each variant meet, (V,) of str.
+    """Return the surfaces that the particles of each variant meet, (V,) of str.
 
-    Such as ``plate, outgoing``: the kind of an outcome. Numbers of one kind vary smoothly, and a
-    mean over several may be near to none of them. It ends with the landing, and impacts in a row on
-    one surface count as one. Of a crowd the ways that more than `RARE` of it takes are told, the
-    most frequent one first, such as ``plate, outgoing | outgoing``.
+    Such as ``plate, outgoing``: the kind of an outcome. Numbers of one kind vary smoothly, while a
+    mean over several kinds may be near to none of them. It ends with the landing, and impacts in a
+    row on one surface count as one. For a crowd the sequences of more than `RARE` of it are listed,
+    the most frequent one first, such as ``plate, outgoing | outgoing``.
     """
     # Particles, and the surfaces that each meets up to its landing.
     kind = recording.events["kind"]
     some = (kind == Kind.IMPACT) | (kind == Kind.LANDING) | (kind == Kind.SETTLE)
     order = some.nonzero()[0]
-    # Columns are taken, not rows, which are ten times as large.
+    # Only needed columns are taken; whole rows are ten times as large.
     particle, surface, lands = (recording.events[name][order].astype(np.int64) for name in FIELDS)
     order = sorted_by(particle, recording.count)
     particle, surface, lands = particle[order], surface[order], lands[order] == Kind.LANDING
@@ -207,7 +207,7 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
     ways = np.full((recording.count, LONGEST + 1), -1)
     near = place <= LONGEST
     ways[particle[near], place[near]] = surface[near]
-    # A way as one number: `np.unique` of rows takes ten times as long.
+    # A sequence as one number, as `np.unique` of rows takes ten times as long.
     taken, kinds, some = np.zeros(recording.count, dtype=np.int64), 1, len(recording.surfaces) + 1
     for met in ways.T[: place.max(initial=-1) + 1]:
         if kinds * some > np.iinfo(np.int64).max:
@@ -236,7 +236,7 @@ SUFFIXES: Final = {".csv": "csv", ".parquet": "parquet"}
 """Endings of files, and the formats they stand for."""
 
 PARQUET: Final = ("Parquet needs pyarrow", "parquet")
-"""What to say without it, and the extra that brings it."""
+"""Message if it is missing, and its extra."""
 
 
 def format_of(path: str | Path) -> str:
@@ -270,9 +270,9 @@ def write_csv(names: Sequence[str], texts: Iterable[str], path: str | Path) -> P
 
 
 def synced(path: Path) -> None:
-    """Have a file that was written, and its name, survive a power cut."""
+    """Make a written file, and its name, survive a power cut."""
     for place, flags in ((path, os.O_RDWR), (path.parent, os.O_RDONLY)):
-        with suppress(PermissionError):  # Windows opens no folders.
+        with suppress(PermissionError):  # Windows does not open folders.
             handle = os.open(place, flags)
             try:
                 os.fsync(handle)
@@ -281,7 +281,7 @@ def synced(path: Path) -> None:
 
 
 def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
-    """Read what `csv_columns` wrote."""
+    """Read columns written by `csv_columns`."""
     cells = list(zip(*csv.reader(io.StringIO(text, newline="")), strict=True))
     return {
         name: np.array(list(map(unquoted, column)), dtype=object)
@@ -299,7 +299,7 @@ PARTIAL = (
     " run.until=settled counts them until nothing slips on the belt, as the theory, solve and"
     " --uncertainty do."
 )
-"""Said where runs may end before the slip does."""
+"""Note for runs that may end before the slip does."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -311,11 +311,11 @@ class Sweep(Shown):
     title : str
         Of the scene.
     quantities : dict of str to Quantity
-        What each varied key is.
+        Description of each varied key.
     columns : dict of str to ndarray, (N,)
-        Read-only: the varied keys, then what came of each variant, see `COLUMNS`
-        (NaN where there is nothing to tell), then ``touches``: which surfaces the particles meet,
-        and ``reason``: why there are no numbers, or not all.
+        Read-only: the varied keys, then the results of each variant, see `COLUMNS` (NaN without a
+        value), then ``touches``: the surfaces that particles meet, and ``reason``: why numbers are
+        missing.
     shape : tuple of int or None
         Values of each key in a grid, whose last key runs fastest; None for samples.
     settled : bool
@@ -358,7 +358,7 @@ class Sweep(Shown):
         return write(self.columns, path, "parquet")
 
     def sheet(self) -> Sheet:
-        """Return from where to where each column goes, and why rows have no numbers."""
+        """Return the range of each column, and the reasons why rows have no numbers."""
         rows = []
         for name, values in self.columns.items():
             if name in TEXTS or name.endswith(ERROR) or not np.isfinite(values).any():

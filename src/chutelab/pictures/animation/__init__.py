@@ -1,10 +1,10 @@
-"""The lesson picture: a film of a recording, slowed down, that stops at what matters.
+"""The lesson picture: a film of a recording, slowed down, that holds at important moments.
 
-A background is drawn once, and what moves on it for each frame. `animate` writes a film; `still`
-the machine before it begins.
+The background is drawn once, and moving parts for each frame. `animate` writes a film; `still` a
+picture of the machine before it begins.
 
-- `moments`: which moments are shown, for how long each, and what happened, in words.
-- `actors`: what moves: particles, arrows, belts, pulley, and the energy bars.
+- `moments`: the moments that are shown, their duration, and what happened, in words.
+- `actors`: moving parts: particles, arrows, belts, pulley, and the energy bars.
 - `files`: how pictures become a GIF or a video.
 """
 
@@ -71,39 +71,39 @@ __all__ = [
 ]  # fmt: skip
 
 SHOWS = ("parabola", "trails", "strobe", "velocity", "energy")
-"""What a picture can show besides the machine and the particles."""
+"""Parts of a picture besides the machine and the particles."""
 
 TRAIL = 0.07
-"""Share of the window's width that the trail of the fastest particle is long."""
+"""Length of the trail at the highest speed, as a share of the window's width."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What the picture holds, and where."""
+    """Content and layout of the picture."""
 
     # pixels
     width: int
     height: int
-    # what stands above the scene; the question may be empty
+    # texts above the scene; the question may be empty
     title: str
     question: str
     shows: frozenset[str]  # some of `SHOWS`
     # where the scene is: left, bottom, width and height as shares of the picture
     view: tuple[float, float, float, float]
-    window: Window  # what of the world is shown, of the shape of `view`
+    window: Window  # the part of the world that is shown, with the aspect ratio of `view`
     fastest: float  # m/s; particle 0's highest speed while it is in the window
 
     def reach(self, share: float, what: str) -> float:
-        """Return the time (s) in which particle 0's highest speed covers a share of the window.
+        """Return the time (s) for a share of the window at particle 0's highest speed.
 
-        As much as arrows (in m for 1 m/s) and trails are long; 0 if `what` is not shown.
+        It is the length of arrows (m for 1 m/s) and trails (s); 0 if `what` is not shown.
         """
         shown = what in self.shows and self.fastest > 0.0
         return share * self.window.width / self.fastest if shown else 0.0
 
     @property
     def arrow(self) -> float:
-        """Length of the arrow of the velocity for 1 m/s, m; 0: there is none.
+        """Length of the velocity's arrow for 1 m/s, m; 0 without an arrow.
 
         That of the highest speed is a tenth of the picture's width.
         """
@@ -127,7 +127,7 @@ def lay_out(
 ) -> Layout:
     """Choose the window such that everything that moves, arrows included, is in the picture.
 
-    It shows all by default, but of a crowd not what particle 0 does.
+    By default it shows everything, but for a crowd not the parts about particle 0.
 
     Raises a `ValueError` if the picture is too small, or `shows` has an unknown name.
     """
@@ -147,7 +147,7 @@ def lay_out(
     last = min(end, float(recording.track(0)["t"][-1]))
     times = track_times(recording, begin, last, fine=FINE * window.width)
     position, velocity = nominal(recording, times)
-    # What has left it for good shall not make all else small.
+    # Particles that have left for good should not make everything else small.
     inside = window.holds(position)
     position, velocity = position[inside], velocity[inside]
     fastest = float(np.hypot(*velocity.T).max(initial=0.0))
@@ -155,7 +155,7 @@ def lay_out(
     tight = Layout(width, height, said, question, shows, view, window, fastest)
     corners = [(window.left, window.bottom), (window.right, window.top)]
     if pulley is not None:
-        # The incoming belt's name stands left of it.
+        # The incoming belt's name is left of it.
         corners.append((-pulley.radius - 0.21 * window.width, 0.0))
     if recording.scene.view is not None:
         return tight
@@ -166,18 +166,19 @@ def lay_out(
 
 
 RIGHT, GAP = 0.99, 0.015
-"""Shares of the picture's width: where text ends, and between the clock and how it runs."""
+"""Shares of the picture's width: right end of text, and gap between the clock and its pace."""
 
 TITLE, LINE, CAPTION = 0.942, 0.065, 0.055
 """Shares of its height: the title's base line, a line below it, the middle of the caption."""
 
 
 class Stage:
-    """Draws the moments of a film: the background once, and for each moment what moves on it.
+    """Draws the moments of a film: the background once, and moving parts for each moment.
 
-    `slow` is seconds on the screen for one second of the recording. The analytic path is there from
+    `slow` is seconds on the screen for one second of the recording. The analytic path is shown from
     the first moment on, or after the time `ask`, s. `figure` is the background and `view` the axes
-    of the scene in it; `moving` is what moves, from back to front; `writings` change.
+    of the scene in it; `moving` has the moving parts, from back to front, and `writings` the
+    changing texts.
     """
 
     def __init__(
@@ -214,10 +215,10 @@ class Stage:
             *others,
         ]
         for dashed in [] if ask is None else parabola:
-            # Below all that moves.
+            # Below all moving parts.
             dashed.set_animated(True)
             self.moving.insert(0, seen(dashed, times > ask))
-        # What the legend names, in its order.
+        # Entries of the legend, in order.
         dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0}
         handles = [Line2D([], [], **dot, color=style.STRIKE, label=say("particle-0")), *named]
         if parts:
@@ -282,12 +283,13 @@ class Stage:
         if layout.question:
             asked = text(0.02, TITLE - LINE, said[1], fontsize=style.NORMAL)
             _shorten(asked, RIGHT * layout.width)
-        # Near what moves: the rectangle around all of it is what a frame of the file costs.
+        # Near the moving parts, since a frame of the file takes the size of the rectangle around
+        # all changes.
         above = layout.view[1] + layout.view[3] + 0.02
         slowed = text(RIGHT, above, pace, fontsize=style.NORMAL, ha="right")
         right = slowed.get_window_extent().x0 - GAP * layout.width
-        # The clock has no digits that change too fast to be read: they would cost as much as all
-        # particles.
+        # The clock has no digits that change too fast to be read; they would take as many bytes as
+        # all particles.
         steps = np.diff([moment.t for moment in moments])
         digits = 2 if len(steps) and np.median(steps) >= 0.01 else 3
         times = [f"t = {figures(moment.t, f'.{digits}f')} s" for moment in moments]
@@ -301,9 +303,9 @@ class Stage:
 
 
 def _add_legend(ax: Axes, handles: list[Line2D], *, components: bool) -> None:
-    """Name what is drawn above the scene, and last the components of the velocity.
+    """Draw the legend above the scene, last the components of the velocity.
 
-    What does not fit beside the first five is left out, the last first.
+    Entries after the first five that do not fit are left out, the last first.
     """
     while True:
         legend = ax.legend(
@@ -332,7 +334,7 @@ def _add_legend(ax: Axes, handles: list[Line2D], *, components: bool) -> None:
             fontsize=style.NORMAL,
             color=style.tint(colour, 0.8, style.INK),
             va="center",
-            # Placed beside what the legend has placed before.
+            # Placed beside the entries placed before.
             zorder=legend.get_zorder() + 1.0,
         )
 
@@ -347,7 +349,7 @@ def _shorten(text: Text, right: float) -> None:
 
 
 def pace_words(slow: float) -> str:
-    """Return how the film's clock runs.
+    """Return the pace of the film's clock in words.
 
     >>> pace_words(10.0), pace_words(1.0), pace_words(0.5)
     ('10× slower', 'real time', '2× faster')
@@ -370,7 +372,7 @@ def draw_scale(ax: Axes) -> None:
     edge = 0.015 * (right - left)
 
     def hides(place: tuple[float, float]) -> int:
-        """Put it there, and return how much it would hide; names count more than lines."""
+        """Put the bar there, and return how much it would hide; names count more than lines."""
         x, y = place
         bar.set_data([x, x + length], [y, y])
         said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
@@ -409,8 +411,8 @@ def animate(
     recording : Recording
         From either engine, with at least one knot of particle 0.
     path : path
-        Where to; written whole or not at all. Its suffix says what: .gif, .mp4 or .webm, the last
-        two with the extra ``chutelab[video]``.
+        The file; written whole or not at all. Its suffix gives the format: .gif, .mp4 or .webm, the
+        last two with the extra ``chutelab[video]``.
     fps : int, optional
         Pictures a second: 25 or 50, or another divisor of 100 below. By default 25; of a stream 20,
         since much of each picture changes.
@@ -426,10 +428,10 @@ def animate(
     show : collection of str, optional
         Which of `SHOWS` to show: "parabola" (the analytic one, dashed), "trails", "strobe" (dots
         at round times), "velocity" (of particle 0, an arrow with its components) and "energy"
-        (the ledger as bars; without it the scene is wider). By default all, but of a crowd
-        neither strobe dots nor velocity, and no impact of particle 0 is told.
+        (the ledger as bars; without it the scene is wider). By default all, but for a crowd neither
+        strobe dots nor velocity, and no impact of particle 0 is described.
     energy : bool, optional
-        Whether `show` has "energy", where it is not given.
+        Whether `show` has "energy", if `show` is not given.
     predict : bool, optional
         Let viewers predict: the film begins without the analytic parabola, and waits as
         the particle comes to the top of the drive pulley, or as it begins.
@@ -484,8 +486,8 @@ def animate(
 def still(recording: Recording, path: str | Path, *, width: int = 1280, height: int = 720) -> Path:
     """Write the machine as the film begins, without a path, as a PNG: the scene of the film alone.
 
-    Parameters, result and errors are as of `animate`; width and height are the film's, of which the
-    picture has twice as many pixels: it is for print.
+    Parameters, result and errors are those of `animate`; width and height are the film's, and the
+    picture has twice as many pixels, for print.
     """
     shows = frozenset(("velocity", "energy"))
     wide, high = 2 * width, 2 * height

@@ -1,8 +1,8 @@
-"""What moves in the picture: particles, the arrow of a velocity, belts, pulley, energy bars.
+"""Moving parts of the picture: particles, a velocity's arrow, belts, pulley, energy bars.
 
-Each is a matplotlib artist that is made once, together with a function that sets it to the film's
-moment of an index. The energy ledger is two stacked bars of equal height: what was put in, and
-where it is now.
+Each is a matplotlib artist that is made once, with a function that sets it to the film's moment of
+an index. The energy ledger is two stacked bars of equal height: the energy put in, and where it is
+now.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ from chutelab.results import Recording
 from chutelab.util.arrays import Bools, Floats, Ints
 
 Moving = tuple[Artist, Callable[[int], object]]
-"""What moves, and the function that sets it to the moment of an index."""
+"""A moving part, and the function that sets it to the moment of an index."""
 
 SHAFT, HEAD = 1.3, 6.0
 """pt; width of an arrow's shaft, and length of its head."""
@@ -60,10 +60,10 @@ SEEN = 0.75
 """Least length of a component that is drawn, in heads of an arrow."""
 
 DRAWN, DRAWN_ALL = 300, 3000
-"""Particles that are drawn at most, particle 0 included; and where all of them are the picture."""
+"""Most particles that are drawn, particle 0 included; and most if the picture shows all of them."""
 
 SMALLEST = 6.0
-"""pt; the diameter the largest particle is drawn with if to scale it would be smaller."""
+"""pt; least diameter of the largest particle, even if to scale it would be smaller."""
 
 MARKS, HOLES = 3, 3
 """Marks on a belt across the window, and holes in the pulley; they move with it."""
@@ -76,7 +76,7 @@ def line(ax: Axes, gid: str, points: Callable[[int], Floats], **look: Any) -> Mo
 
 
 def seen(artist: Artist, there: Bools) -> Moving:
-    """Return what is seen at the moments of `there`, (T,)."""
+    """Return an artist that is visible at the moments of `there`, (T,)."""
     return artist, lambda index: artist.set_visible(bool(there[index]))
 
 
@@ -89,9 +89,9 @@ def bodies(
     color: str,
     edge: float,
 ) -> list[Moving]:
-    """Return particles to scale, or larger so as to be seen, with a white edge (pt).
+    """Return particles to scale, or larger to be visible, with a white edge (pt).
 
-    Where there are so many that all are to be seen together, they are not made larger.
+    If there are so many that all are shown together, they are not made larger.
     """
     few = recording.count <= DRAWN or not recording.machine.interact
     least = SMALLEST if few and not one_of_many(recording) else LEAST
@@ -103,7 +103,7 @@ def bodies(
 
 
 def trail(ax: Axes, recording: Recording, times: Floats, reach: float) -> Moving:
-    """Return the way that particle 0 came in the last `reach` seconds of the recording."""
+    """Return particle 0's path of the last `reach` seconds of the recording."""
     fine = FINE * float(np.ptp(ax.get_xlim()))
     passed = np.union1d(times, track_times(recording, fine=fine))
     path, _ = nominal(recording, passed)
@@ -118,7 +118,7 @@ def trail(ax: Axes, recording: Recording, times: Floats, reach: float) -> Moving
 
 
 def strobe(ax: Axes, recording: Recording, times: Floats) -> Moving:
-    """Return the dots where particle 0 was at round times."""
+    """Return the dots of particle 0 at round times."""
     stops = strobe_times(recording)
     dots, _ = nominal(recording, stops)
     return line(ax, "strobe", lambda index: dots[stops <= times[index]], **style.RINGS, ms=4.5)
@@ -146,7 +146,7 @@ def arrows(ax: Axes, position: Floats, velocity: Floats, length: float) -> Movin
         gid="arrows",
         animated=True,
     )
-    # Components are drawn where there are two that can be told from the whole.
+    # Components are drawn if both are large enough to be distinguished from the whole.
     two = length * np.abs(velocity).min(axis=1) > SEEN * HEAD / points_of(ax, 1.0)
 
     def show(index: int) -> None:
@@ -160,11 +160,11 @@ def arrows(ax: Axes, position: Floats, velocity: Floats, length: float) -> Movin
 def crowd(
     ax: Axes, recording: Recording, times: Floats, reach: float
 ) -> tuple[list[Moving], list[Line2D]]:
-    """Return the other particles, in the colours of their streams, and what a legend says of them.
+    """Return the other particles in the colours of their streams, and their legend.
 
-    They are evenly thinned out to `DRAWN`; those that meet, or are many, to `DRAWN_ALL`. Trails
-    reach back `reach` seconds of the recording, to the picture before at least; 0: there are none,
-    nor are there of more than `DRAWN`.
+    They are evenly reduced to `DRAWN`, or to `DRAWN_ALL` if they meet, or are many. Trails reach
+    back `reach` seconds of the recording, at least to the picture before; there are none with 0, or
+    for more than `DRAWN` particles.
     """
     first, last = recording.ends()
     during = np.flatnonzero(recording.released)[(first["t"] <= times[-1]) & (last["t"] >= times[0])]
@@ -191,7 +191,7 @@ def crowd(
         if not len(own):
             continue
         gid = "crowd" if len(streams) == 1 else f"crowd {streams[i]}"
-        # Their white edges tell disks apart where they overlap.
+        # White edges separate disks that overlap.
         moving += bodies(ax, recording, own, times, gid, color, WHITE)
         if reach and len(particles) < DRAWN:
             moving.insert(0, trails(ax, places(recording, own, times), since, color, gid))
@@ -199,7 +199,7 @@ def crowd(
 
 
 def trails(ax: Axes, positions: Floats, since: Ints, color: str, gid: str) -> Moving:
-    """Return the ways of particles from the pictures `since`, (T,), on; positions are (T, n, 2)."""
+    """Return the paths of particles from the pictures `since`, (T,), on, (T, n, 2)."""
 
     def behind(index: int) -> Floats:
         paths = positions[max(0, min(since[index], index - 1)) : index + 1]
@@ -212,7 +212,7 @@ def trails(ax: Axes, positions: Floats, since: Ints, color: str, gid: str) -> Mo
 
 
 def strung(ax: Axes, recording: Recording, times: Floats) -> list[Moving]:
-    """Return the joints, if there are any to draw."""
+    """Return the joints, if any are drawn."""
     if all(joint.kind == "pin" for joint in recording.machine.joints):
         return []
     paths, gap = strings(recording, times), np.full((1, 2), np.nan)
@@ -224,7 +224,7 @@ def strung(ax: Axes, recording: Recording, times: Floats) -> list[Moving]:
 
 
 def gates(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
-    """Return the pieces that are not always there, or move: each is seen while and where it is."""
+    """Return the pieces that move or do not always exist, at their places and times."""
 
     def shown(piece: Pieces) -> Moving:
         mover = machine.mover(int(piece.surface))
@@ -244,13 +244,13 @@ def gates(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
 
 
 LEAVES = 2.0
-"""Heights of a name; what moves farther than this from its name takes the name along."""
+"""In heights of a name: a surface that moves farther than this from its name takes it along."""
 
 
 def names(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
-    """Return the names on `ax` that go along with their surfaces, upright, each on its side.
+    """Return the names on `ax` that move with their surfaces, upright, each on its side.
 
-    What turns or shakes on the spot leaves its name where it is.
+    The name of a surface that turns or shakes on the spot stays in place.
     """
     found = {label.get_gid(): label for label in ax.texts if isinstance(label, Annotation)}
     moving = []
@@ -262,7 +262,7 @@ def names(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
 
 
 def _leaves(ax: Axes, machine: Machine, mover: Mover, label: Annotation, times: Floats) -> bool:
-    """Tell whether what moves is ever far from where its name stands."""
+    """Whether a moving surface is ever far from its name."""
     places = np.concatenate([[label.xy], mover.at_rest(label.xy, times)])[:, None]
     own = [part.of(part.surface == mover.surface) for part in machine.parts]
     gaps = np.concatenate([part.gap(places) for part in own], axis=1).min(axis=1)
@@ -270,13 +270,13 @@ def _leaves(ax: Axes, machine: Machine, mover: Mover, label: Annotation, times: 
 
 
 def _going(ax: Axes, mover: Mover, label: Annotation, times: Floats) -> Moving:
-    """Return a name that what moves carries, and that stays as far from it as it is written."""
+    """Return a name that a moving surface carries, at its distance as written."""
     points = 72.0 / ax.figure.dpi
     box, tip = np.asarray(label.get_window_extent()), ax.transData.transform(label.xy)
     half, (right, up) = 0.5 * points * np.ptp(box, axis=0), points * (box.mean(axis=0) - tip)
     towards = np.arctan2(up, right) + np.append(0.0, mover.pose(times)[:, 2])
     sides = np.stack([np.cos(towards), np.sin(towards)], axis=-1)
-    # From its middle to where the text ends on the side of the surface.
+    # From the middle of the text to its end on the side of the surface.
     ends = (half / np.maximum(np.abs(sides), 1e-9)).min(axis=1)
     beyond = np.hypot(right, up) - ends[0]
     offsets = (ends + beyond)[1:, None] * sides[1:] if beyond > 0.0 else np.zeros((len(times), 2))
@@ -290,7 +290,7 @@ def _going(ax: Axes, mover: Mover, label: Annotation, times: Floats) -> Moving:
 
 
 def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
-    """Return marks that run with belts, and holes that turn with pulleys and rollers at v/R."""
+    """Return marks that move with belts, and holes that turn with pulleys and rollers at v/R."""
     spacing = float(np.ptp(ax.get_xlim())) / MARKS
     driven = [
         piece
@@ -329,11 +329,12 @@ def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
 
 
 class Writing:
-    """A text that changes from frame to frame, by Pillow; `said` is that of each moment.
+    """A text that changes from frame to frame, by Pillow; `said` has the text of each moment.
 
-    Matplotlib lays a changed text out anew, which for the eight of a frame takes 3.3 ms, ten times
-    as long as Pillow. Its size is in pt, its place in pixels from the left and the top; what of it
-    is there says `anchor`, as Pillow names it, such as "rs": the right end of the base line.
+    Matplotlib lays out a changed text again, which for the eight texts of a frame takes 3.3 ms, ten
+    times as long as with Pillow. The size is in pt, the place in pixels from the left and the top;
+    `anchor`, as in Pillow, says which point of the text is there, such as "rs": the right end of
+    the base line.
     """
 
     def __init__(
@@ -403,15 +404,15 @@ SIGNS = {
 """The ledger with everything on one side: start + belt work + residual - K - U - losses = 0."""
 
 BASE = 0.78
-"""Share of a row above the line that its text stands on."""
+"""Share of a row above its text's base line."""
 
 
 def stacks(balance: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """Split a ledger into what was put in and where it is, all values positive.
+    """Split a ledger into energy put in and energy now, all values positive.
 
-    It is as `plots.scenery.energies` gives it, J, (T,) each. An entry of the other
-    sign changes sides: work that a braking belt takes out belongs to where the energy is. Both
-    sides add up to the same, see `SIGNS`.
+    The ledger is that of `plots.scenery.energies`, J, (T,) each. An entry with the opposite sign
+    changes sides: the work that a braking belt takes belongs to the energy now. Both sides have the
+    same sum, see `SIGNS`.
     """
     signed = {name: sign * balance[name] for name, sign in SIGNS.items() if name in balance}
     put_in = {name: np.maximum(values, 0.0) for name, values in signed.items()}
@@ -423,8 +424,8 @@ def bars(
 ) -> tuple[list[Moving], list[Writing]]:
     """Return the blocks of two stacked bars on `ax`, and a column of figures on `table`.
 
-    The ledger is as for `stacks`; the highest bar sets the scale. What belts,
-    drives and hinges do is one block, called as `drives` says.
+    The ledger is as for `stacks`; the highest bar sets the scale. The work of belts, drives and
+    hinges is one block, with the name `drives`.
     """
     sides = stacks(balance)
     highest = float(np.max(sum(sides[0].values())))

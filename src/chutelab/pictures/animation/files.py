@@ -1,4 +1,4 @@
-"""Films as files: a GIF, or a video for those who project from other programs.
+"""Films as files: GIF or video.
 
 Pillow writes the GIF: one fixed palette for all frames, so that no colour can flicker, and of each
 frame only the pixels that changed. Videos, mp4 or webm, go through imageio and its ffmpeg.
@@ -25,9 +25,8 @@ from chutelab.util.errors import MissingLibraryError
 def palette() -> tuple[str, ...]:
     """Return the colours of every GIF: few, since few make a small file.
 
-    The ground, the greys and the colours with a meaning, unmixed, and the mixtures at which
-    anti-aliased edges between them are read as smooth. Every other colour is shown as the nearest
-    of these.
+    These are the background, the greys and the colours with a meaning, and mixtures of them with
+    which anti-aliased edges look smooth. Every other colour is shown as the nearest of these.
     """
     hues = [style.TRACK, style.ANALYTIC, style.BELT, style.STRIKE, style.STREAM, PURPLE]
     flat = [*style.ENERGY.values(), style.WALL]
@@ -45,19 +44,19 @@ def palette() -> tuple[str, ...]:
         style.CLEAT,
         style.BELT_NAME,
     ]
-    # Where a grey edge would otherwise be shown in a dull colour.
+    # Otherwise a grey edge would be shown in a dull colour.
     greys += [style.tint(style.INK, share) for share in (0.81, 0.592, 0.53, 0.17)]
     return tuple(dict.fromkeys([*greys, *hues, *flat, *edges, *meeting, *dark]))
 
 
 class Colours:
-    """Which of the few colours of `palette` each pixel is shown in."""
+    """Maps pixels to the colours of `palette`."""
 
     def __init__(self) -> None:
         self.table = b"".join(bytes.fromhex(colour[1:]) for colour in palette())
         self.reference = Image.new("P", (1, 1))
         self.reference.putpalette(self.table)
-        # Of the upper six bits of red, green and blue, on which it depends, as Pillow says it.
+        # Table over the upper six bits of red, green and blue, filled by Pillow.
         self.known = np.full(1 << 18, -1, dtype=np.int16)
 
     def of(self, pixels: NDArray[np.uint32]) -> NDArray[np.uint8]:
@@ -78,16 +77,17 @@ def write_gif(
 ) -> None:
     """Write pictures of one size, (H, W, 4), RGBA, as a GIF that loops for ever.
 
-    Each stays for its delay in hundredths of a second; equal ones in a row become one frame. Of
-    each only what changed is looked at, and written. The comment is kept, not shown.
+    Each stays for its delay in hundredths of a second; equal ones in a row become one frame. Only
+    the part that changed is converted and written. The comment is stored, not shown.
     """
     colours = Colours()
-    # The table ends with a colour that no pixel has: there the last frame stays to be seen.
+    # The table ends with a colour that no pixel has; it is transparent, so that the last frame
+    # stays visible.
     clear = len(colours.table) // 3
     look: dict[str, Any] = {"transparency": clear, "disposal": 1}
 
     def frames() -> Iterator[tuple[NDArray[np.uint8], tuple[int, int], int]]:
-        """Yield frames, where each is, and how long it stays."""
+        """Yield frames with their places and durations."""
         waits: tuple[NDArray[np.uint8], tuple[int, int]] | None = None
         stays = 0
         for picture, delay in zip(pictures, delays, strict=True):
@@ -156,8 +156,8 @@ def write_video(
     from imageio.v2 import get_writer
 
     codec, parameters = VIDEOS[kind]
-    # The same pictures make the same bytes: the encoders' work depends on how many threads share
-    # it, and ffmpeg gives a webm a random number unless told.
+    # So that the same pictures make the same bytes: the encoders' result depends on the number of
+    # threads, and ffmpeg writes a random number into a webm unless told.
     parameters += " -threads 4 -flags:v +bitexact -fflags +bitexact"
     options: dict[str, Any] = {
         "fps": fps, "codec": codec, "quality": None, "pixelformat": "yuv420p",

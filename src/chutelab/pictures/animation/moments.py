@@ -1,4 +1,4 @@
-"""Which moments of a recording the film shows, for how long each, and what happened, in words."""
+"""The moments of a recording that the film shows, their duration, and words for them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from chutelab.util.arrays import Bools, Floats, Ints
 
 
 def surface_words(called: str, form: str = "surface") -> str:
-    """Return how a surface is spoken of; `form` is "surface", or "on" for what is on it."""
+    """Return the words for a surface; `form` is "surface", or "on" for something on it."""
     if called in ("incoming", "outgoing", "plate", PARTICLES):
         return say(f"{form}-{called}")
     return say("surface", name=named(called))
@@ -27,12 +27,12 @@ def surface_words(called: str, form: str = "surface") -> str:
 def contact_normal(machine: Machine, event: Any) -> Floats:
     """Return the unit normal of an impact, away from the surface, (2,).
 
-    It comes from where the particle is: a fixed step's velocities have gravity in them, too.
+    It comes from the particle's place, as velocities of a fixed step include gravity.
     """
     position, velocity = event["position"], event["velocity_before"]
     mover, back = machine.mover(int(event["surface"])), np.eye(2)
     if mover is not None:
-        # Where and as the surface is written.
+        # In the frame of the surface as written.
         position, back = mover.at_rest(position, event["t"]), mover.back(float(event["t"]))
         velocity = back @ (velocity - mover.velocity(event["t"])[:2])
     own = [piece for piece in machine.pieces if piece.surface == event["surface"]]
@@ -40,7 +40,7 @@ def contact_normal(machine: Machine, event: Any) -> Floats:
     radius = np.broadcast_to(machine.particle.radius, machine.count)[event["particle"]]
     away, normal = nearest.away(position), nearest.normal(position)
     gap = float(np.hypot(*away))
-    # At an end it is the way from there.
+    # At an end it is the direction from there.
     if gap > 0.5 * radius > 0.0 and abs(away[0] * normal[1] - away[1] * normal[0]) > 1e-9 * gap:
         return np.asarray(away / gap @ back)
     return np.asarray((normal if normal @ velocity < 0.0 else -normal) @ back)
@@ -55,13 +55,13 @@ def sentence(recording: Recording, event: Any) -> str:
     told = kind.name.lower()
     if kind == Kind.SEPARATION and called == "incoming":
         told = "pulley"
-    # The event keeps the velocity of its `particle` only.
+    # The event has the velocity of its `particle` only.
     by, events = int(event["particle"]), recording.events
     before_it = events[(events["particle"] == 0) & (events["t"] < event["t"])]
     if kind == Kind.COLLISION and by:
         told = "hit"
     if kind == Kind.SLIP and {*before_it["kind"][-1:]} & {Kind.IMPACT, Kind.LANDING, Kind.SLIP}:
-        # It slid already, on this surface or on one that goes over to it.
+        # It was sliding already, on this surface or on one that continues into it.
         return say("slides", on=surface_words(called, "on"))
     before, after = (
         f"{figures(hypot(*event[key]))} m/s" for key in ("velocity_before", "velocity_after")
@@ -74,12 +74,12 @@ def sentence(recording: Recording, event: Any) -> str:
     if kind not in (Kind.IMPACT, Kind.LANDING) or event["normal_impulse"] == 0.0:
         return text
     normal = contact_normal(recording.machine, event)
-    # Relative to the surface, where it is touched.
+    # Relative to the surface at the contact.
     mover, own = recording.machine.mover(int(event["surface"])), np.zeros((2, 2))
     if mover is not None:
         radius = np.broadcast_to(recording.machine.particle.radius, recording.count)[by]
         touched, t = event["position"] - radius * normal, float(event["t"])
-        # What hangs on a hinge has another velocity after the blow.
+        # A hinged surface has another velocity after the impact.
         own = np.stack([mover.velocity_at(touched, one) for one in (np.nextafter(t, 0.0), t)])
     into, off = (
         abs(float((event[v] - one) @ normal))
@@ -90,7 +90,7 @@ def sentence(recording: Recording, event: Any) -> str:
     if kind == Kind.LANDING and list(before_it["kind"][-1:]) == [Kind.SEPARATION]:
         flown = event["t"] - before_it["t"][-1]
         text = say("event-flight", said=text, time=figures(flown, ".3f"))
-    # Booked from the state before to the one after, or, of an engine that steps, in its step.
+    # Booked between the states before and after, or with a stepped engine within its step.
     track = recording.track(0)
     start, end = (int(np.searchsorted(track["t"], event["t"], side)) for side in ("left", "right"))
     after_it = max(start, end - 1)
@@ -112,7 +112,7 @@ def sentence(recording: Recording, event: Any) -> str:
 
 
 def going_on(recording: Recording, event: Any, *, flying: bool, still: bool = False) -> str:
-    """Return what particle 0 does some time after an event: `flying`, `still`, or in contact."""
+    """Return particle 0's state some time after an event: `flying`, `still`, or in contact."""
     kind = Kind(int(event["kind"]))
     if flying:
         return say("flying")
@@ -123,9 +123,9 @@ def going_on(recording: Recording, event: Any, *, flying: bool, still: bool = Fa
 
 
 def in_flight(recording: Recording, times: Floats, near: float) -> Bools:
-    """Tell at which times (T,) particle 0 moves as gravity alone would have it.
+    """Return the times (T,) at which particle 0 moves under gravity alone.
 
-    Just before a time or just after it, within `near` seconds: an impact is in flight too.
+    Within `near` seconds before or after a time, so that an impact counts as flight, too.
     """
     moments = times[:, None] + np.array([-near, 0.0, near])
     velocity = nominal(recording, moments.ravel())[1].reshape(*moments.shape, 2)
@@ -135,13 +135,13 @@ def in_flight(recording: Recording, times: Floats, near: float) -> Bools:
 
 
 RUNNING = 4.2
-"""s; the longest the motion of a film takes on the screen by default, holds not counted."""
+"""s; longest default duration of a film's motion on the screen, without holds."""
 
 LIVES = 3.0
 """Longest film of a stream, in multiples of the time that particle 0 takes."""
 
 HOLDS, WORTH = 4, 0.05
-"""The film stops at the hardest impacts only: at most so many, or it would be a slide show, and at
+"""The film holds only at the hardest impacts: at most so many, or it would be a slide show, and at
 none with less than this share of the largest impulse."""
 
 HOLD_TOTAL, HOLD_LONGEST, TAIL = 300, 130, 120
@@ -151,14 +151,14 @@ ASKED = 300
 """Hundredths of a second that a film waits for a prediction."""
 
 EDGE = 0.012
-"""Least distance of particle 0 from the window's edges as the film begins, in shares of its larger
-side."""
+"""Least distance of particle 0 from the window's edges when the film begins, in shares of its
+larger side."""
 
 TOLD = 1.2
-"""s on the screen, holds not counted, for which the caption tells what happened."""
+"""s on the screen, without holds, for which the caption says what happened."""
 
 LASTING = (Kind.STICK, Kind.SETTLE, Kind.EXIT)
-"""Events that begin a motion: the caption tells them until the next event."""
+"""Events that begin a motion: the caption shows them until the next event."""
 
 
 @dataclass(frozen=True)
@@ -174,9 +174,9 @@ class Moment:
 
 
 def asked(recording: Recording, begin: float) -> float:
-    """Return when a film that lets one predict stops (s): nothing is decided yet.
+    """Return the time (s) at which a film stops for a prediction, before the result.
 
-    That is as particle 0 comes to the top of the drive pulley, or as the film begins.
+    It is when particle 0 comes to the top of the drive pulley, or when the film begins.
     """
     track = recording.track(0)
     times = np.linspace(float(track["t"][0]), action(recording)[0], 2000)
@@ -195,11 +195,11 @@ def film(
     ask: float | None = None,
     crowd: bool = False,
 ) -> tuple[Moment, ...]:
-    """Return the moments from `begin` to `end`: even steps, and a hold at each impact worth it.
+    """Return the moments from `begin` to `end`: equal steps, and holds at the hardest impacts.
 
     There are `fps` pictures a second; `slow` is seconds on the screen for one of the recording. At
-    the time `ask`, if it is given, the film holds, for viewers to predict what comes. Of a
-    `crowd` it tells how many have come and gone, and holds at no impact of particle 0.
+    the time `ask`, if it is given, the film holds, for viewers to predict what comes. For a `crowd`
+    it shows how many have come and gone, and does not hold at impacts of particle 0.
 
     Raises a `ValueError` if `fps` is no divisor of 100 up to 50 (a shorter delay browsers take for
     10 hundredths of a second), or `slow` is not positive and finite.
@@ -219,7 +219,7 @@ def film(
     crowd = crowd or one_of_many(recording)
     if crowd:
         own = own[:0]
-    # The hardest impacts that are worth a hold, in order, one for each time.
+    # The hardest impacts, in order, one for each time.
     impulse = np.abs(own["normal_impulse"])
     struck = np.flatnonzero(np.isin(own["kind"], STRUCK))
     struck = struck[impulse[struck] >= WORTH * impulse[struck].max(initial=0.0)]
@@ -229,7 +229,7 @@ def film(
     fixed = stops if ask is None else np.append(stops, ask)
     times = np.linspace(begin, end, max(2, round((end - begin) / step) + 1))
     if len(fixed):
-        # A step that almost coincides with a stop would be a stumble.
+        # A step that almost coincides with a hold would look like a stumble.
         times = times[np.abs(times[:, None] - fixed).min(axis=1) > 0.5 * step]
     times = np.unique(np.concatenate([[begin], times, fixed, [end]]))
     hold = min(HOLD_TOTAL // max(len(stops), 1), HOLD_LONGEST)
@@ -255,10 +255,10 @@ def film(
 
 
 def span(recording: Recording, shown: Window) -> tuple[float, float]:
-    """Return the times (s) between which to film.
+    """Return the beginning and end of the film (s).
 
-    From when particle 0 comes into the window to the end of the recording, but of a stream for no
-    longer than `LIVES` times particle 0 takes, or the first of each of several streams.
+    It begins when particle 0 comes into the window and ends with the recording, but a stream is
+    shown for at most `LIVES` times the time of particle 0, or of the first of each stream.
     """
     track = recording.track(0)
     first, last = float(track["t"][0]), float(track["t"][-1])
@@ -295,7 +295,7 @@ def _at(t: float, said: str) -> str:
 
 
 def _gates(machine: Machine, times: Floats, slow: float) -> list[str]:
-    """Return the caption at each time: for a while which gate opened or closed last."""
+    """Return the caption at each time: for a while the gate that opened or closed last."""
     news = {
         (t, _at(t, say(f"event-gate-{what}", surface=surface_words(machine.surfaces[surface]))))
         for parts in machine.parts
@@ -314,9 +314,9 @@ def _gates(machine: Machine, times: Floats, slow: float) -> list[str]:
 def _words(
     recording: Recording, own: NDArray[Any], held: Ints, times: Floats, slow: float
 ) -> list[str]:
-    """Return the caption at each time: for a while what happened last, then what goes on.
+    """Return the caption at each time: for a while the last event, then the present motion.
 
-    What is told: the impacts that the film holds at, and events that are no impacts.
+    Captions are for impacts at which the film holds, and for other events.
     """
     struck = np.isin(own["kind"], STRUCK)
     told = ~struck & (own["kind"] != Kind.RELEASE)
@@ -340,7 +340,7 @@ def _words(
         story = int(np.searchsorted(own["t"][stories], t, side="right")) - 1
         if story >= 0:
             last = own[stories[story]]
-            # An impact is no news any more once the particle slides.
+            # An impact is no longer mentioned once the particle slides.
             news = slow * (t - last["t"]) <= TOLD and (flies or last["kind"] not in STRUCK)
             if news or last["kind"] in LASTING:
                 captions.append(lines[story])
@@ -353,7 +353,7 @@ def _words(
         said = going_on(recording, own[latest], flying=flies, still=lies) if known else ""
         captions.append(said)
     for i in held:
-        # What else happens in the same instant has to wait for the next picture.
+        # Other events at the same time wait for the next picture.
         at = int(np.searchsorted(times, own["t"][i]))
         captions[at] = lines[int(np.searchsorted(stories, i))]
     return captions

@@ -1,17 +1,17 @@
-"""A scene that answers: one page that any browser opens, and the same in a notebook.
+"""A scene as an interactive page that any browser opens, and the same in a notebook.
 
 `html` and `write` make one HTML file of a scene: data, style, script, the engine's thread and its
 WebAssembly; `live` shows it in a notebook, and alone needs anywidget.
 
-- `describe`: what a page knows of a scene, as JSON.
-- ``bundle``: the script of the page and that of the engine's thread, as `tools/build_page.py` makes
-  them of the modules.
+- `describe`: the data of a page about its scene, as JSON.
+- ``bundle``: the script of the page and that of the engine's thread, made from the modules by
+  `tools/build_page.py`.
 - ``assets``: HTML, CSS, the catalogues of words, and the modules of TypeScript; each says at its
   top what it is. ``scene.ts``, ``plan.ts`` and ``machine.ts`` make a machine of keys, ``core.ts``
-  and ``worker.ts`` run it with the contact engine, in a thread; ``lab.ts`` holds scene and run,
-  ``transfer.ts`` and ``prediction.ts`` are the closed form, ``task.ts`` and ``exercise.ts`` a
-  lesson's exercise, ``stage.ts`` is the picture, ``bench.ts`` what is done on it, ``palette.ts``
-  what it is built of, ``inspector.ts`` what is typed, and ``app.ts`` joins all.
+  and ``worker.ts`` run it with the contact engine, in a thread; ``lab.ts`` has scene and run,
+  ``transfer.ts`` and ``prediction.ts`` the closed form, ``task.ts`` and ``exercise.ts`` a lesson's
+  exercise, ``stage.ts`` the picture, ``bench.ts`` the editing in it, ``palette.ts`` the parts,
+  ``inspector.ts`` the fields, and ``app.ts`` joins all.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ __all__ = ["live"]
 LANGUAGES = ("en", "de")
 
 LETTERS = bytes(code for code in range(33, 127) if code not in b'"<\\')
-"""In a script element's JSON each stands for itself."""
+"""Characters that need no escape in the JSON of a script element."""
 
 COLOURS = ("track", "analytic", "belt", "strike", "stream")
 
@@ -64,23 +64,23 @@ def html(
     Parameters
     ----------
     scene : Scene, optional
-        Without mass points. None begins with an empty machine.
+        A scene without mass points. None begins with an empty machine.
     language : {"en", "de"}
-        Of all that the page says; what the scene says stands as it is.
+        Language of the page; texts of the scene stay as they are.
     home : tuple of str, optional
         Text and address of a link back, for a page that is one of several.
     exercise : mapping, optional
-        What `chutelab.classroom.exercises.data_of` makes of an exercise.
+        An exercise as `chutelab.classroom.exercises.data_of` returns it.
     lesson : mapping, optional
-        Title and question of a lesson, and its steps as
-        `chutelab.classroom.lessons.steps.data_of` has them.
+        Title and question of a lesson, and its steps as `chutelab.classroom.lessons.steps.data_of`
+        returns them.
     partly : bool
-        Whether the page says what it cannot show of the scene, and leaves it out.
+        Whether the page leaves out what it cannot show of the scene, and says so.
 
     Raises
     ------
     SceneError
-        If there is something in the scene that the contact engine has not, by its key.
+        If the scene has something that the contact engine lacks, with its key.
     """
     # The colours of every picture; page.css has those for the dark.
     colours = {
@@ -102,13 +102,14 @@ def html(
     else:
         live = live_of(scene, facts["scene"])
     if given := facts["scene"].get("live"):
-        # As what is saved from the page will have it.
+        # As in files saved from the page.
         facts["scene"]["live"] = {key: live[key] for key in given}
     shown = [row for row in REGISTRY.values() if row.symbol]
-    # What the page's language has no words for is called as in the registry.
+    # Quantities without words in the page's language have the registry's names.
     meanings = {f"number-{row.name}": row.meaning for row in shown}
     (other,) = {*LANGUAGES} - {language}
-    # Packed, for it is long: all but the scene; the script, too, which boot.ts puts into the page.
+    # The data is packed because it is long, except the scene; so is the script, which boot.ts puts
+    # into the page.
     script = _file(f"bundle/{'app' if lesson is None else 'lessonpage'}.js")
     large = {
         "script": script,
@@ -118,7 +119,7 @@ def html(
         "quantities": {row.name: {"symbol": row.symbol, "unit": row.unit} for row in shown},
         **({} if exercise is None else {"exercise": exercise}),
         **({} if lesson is None else {"lesson": lesson}),
-        # What is handed out with a lesson is in one language throughout.
+        # A page with a lesson has one language only.
         **(
             {}
             if lesson or exercise
@@ -130,12 +131,12 @@ def html(
         "live": live,
         "version": own_version(),
         "language": language,
-        # Not packed: the engine's thread begins before all else.
+        # Not packed, as the engine's thread starts first of all.
         "worker": _file("bundle/worker.js"),
         "packed": _packed(json.dumps(large, separators=(",", ":")).encode()),
         "wasm": _packed((core / "page.wasm").read_bytes()),
     }
-    # Within a script element nothing but an end tag must look like one.
+    # Nothing within a script element may look like its end tag.
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
     boot = _file("bundle/boot.js")
     return Template(_file("assets/page.html")).substitute(
@@ -156,7 +157,7 @@ def html(
 def write(scene: Scene | None, path: str | Path, **options: Any) -> int:
     """Write the live page of a scene, whole or not at all, and return its size in bytes.
 
-    Options are those of `html`; a file that is there is replaced, its folder must be there.
+    Options are those of `html`; an existing file is replaced, its folder must exist.
     """
     data = html(scene, **options).encode("utf-8")
     with whole(Path(path)) as unfinished:
@@ -167,7 +168,7 @@ def write(scene: Scene | None, path: str | Path, **options: Any) -> int:
 def live(
     scene: AnyScene, overrides: Overrides = (), *, height: int = 640, language: str = "en"
 ) -> Any:
-    """Show a scene in a notebook as a page that answers: drag the plate, and all else follows.
+    """Show a scene in a notebook as an interactive page: drag the plate, and the rest follows.
 
     Parameters
     ----------
@@ -183,13 +184,13 @@ def live(
     Returns
     -------
     LivePage
-        Put it last in a cell to see it. Its `scene` is what the page has made of the scene, TOML
-        text for `chutelab.scene.parse`.
+        Put it last in a cell to see it. Its `scene` is the scene as changed in the page, TOML text
+        for `chutelab.scene.parse`.
 
     Raises
     ------
     SceneError
-        If the scene cannot be used, or has what the contact engine has not.
+        If the scene is invalid, or has something that the contact engine lacks.
     MissingLibraryError
         An ImportError, without anywidget.
 
@@ -240,8 +241,8 @@ export default {
 def widget() -> Any:
     """Return the class of live pages in a notebook: a frame with the page in it.
 
-    The page tells what it changed by ``parent.postMessage({chutelab: "scene", toml}, "*")``. It is
-    made when it is first asked for, since only notebooks need anywidget.
+    The page reports changes by ``parent.postMessage({chutelab: "scene", toml}, "*")``. The class is
+    made when first needed, since only notebooks need anywidget.
     """
     library("anywidget", "live pages in a notebook need anywidget", "notebook")
     from anywidget import AnyWidget
@@ -257,10 +258,9 @@ def widget() -> Any:
         height : int
             Of the frame, in pixels.
         title : str
-            What the frame is called for those who do not see it.
+            Name of the frame for screen readers.
         scene : str
-            The scene as it is in the page now, TOML text; `chutelab.scene.parse` makes a scene of
-            it.
+            The present scene of the page as TOML text, for `chutelab.scene.parse`.
         """
 
         _esm = SHOWN
@@ -278,7 +278,7 @@ def _file(name: str) -> str:
 
 
 def _strings(language: str) -> dict[str, str]:
-    """Return all texts of a page; titles of scenes by what they are in the scene."""
+    """Return all texts of a page; titles of scenes by the titles in their files."""
     titles = words(language).titles().items() if language != "en" else ()
     said: dict[str, str] = json.loads(_file(f"assets/strings/{language}.json"))
     return said | {f"title-{own}": title for own, title in titles}
@@ -286,9 +286,9 @@ def _strings(language: str) -> dict[str, str]:
 
 @lru_cache(8)
 def _packed(content: bytes) -> str:
-    """Return it compressed, as text: two of 91 letters for 13 bits, and one for at most the last 6.
+    """Return data compressed, as text: two of 91 letters for 13 bits, one for up to 6 last bits.
 
-    In base64 it is a twelfth longer; the page reads it in `bytesOf` of ``core.ts``.
+    Base64 would be a twelfth longer; the page decodes it in `bytesOf` of ``core.ts``.
     """
     bits = np.unpackbits(np.frombuffer(zlib.compress(content, 9), dtype=np.uint8))
     rest = len(bits) % 13
@@ -302,5 +302,5 @@ def _packed(content: bytes) -> str:
 
 
 def _hash(text: str) -> str:
-    """Return what a Content-Security-Policy calls an inline text it allows."""
+    """Return the hash of an inline text for a Content-Security-Policy."""
     return f"sha256-{b64encode(sha256(text.encode('utf-8')).digest()).decode('ascii')}"

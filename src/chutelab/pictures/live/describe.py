@@ -1,4 +1,4 @@
-"""What a page is told of its scene and of scene files: `describe`."""
+"""The data of a page about its scene and about scene files: `describe`."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.units import LARGEST, SHORTEST
 
 MOST: Final = 100_000
-"""Particles that a page has room for: it keeps their tracks, and draws them in each frame."""
+"""Most particles of a page, which keeps their tracks and draws them in each frame."""
 
 EXAMPLES: Final = ("inclined-40", "cascade", "spoon", "hopper", "galton", "free-fall")
-"""Scenes that the empty page offers, with the words ``example-NAME`` in its catalogues."""
+"""Scenes offered by the empty page, with the words ``example-NAME`` in its catalogues."""
 
 
 def _part(
@@ -68,44 +68,42 @@ PARTS: Final = (
     _part("pin", "I", "pin", "pin", "particle other from"),
     _part("sensor", "S", "sensor", "from to", "name from to"),
 )  # fmt: skip
-"""What can be added to a machine, a row each: its word, the key that begins it, its table, the key
-that each point set in the picture is for, those shown first (three of them), those that tell it
-from another part of its table, and what else it begins with (m and kg: for a picture one metre
-high). What a stream has not is of the kind of its particles."""
+"""Parts that can be added to a machine, one row each: word, shortcut key, table, the key for each
+point set in the picture, the three keys shown first, the keys that distinguish it from other parts
+of its table, and its further initial values (m and kg, for a picture one metre high). Keys that a
+stream lacks belong to the kind of its particles."""
 
 
 def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     """Return the scene and the rules of scene files as plain data for JSON.
 
-    A drop that is measured from the impact is written as one from the top of the pulley: the
-    outgoing belt stays where it is while the plate is turned.
+    A drop measured from the impact is converted to one from the top of the pulley, so that the
+    outgoing belt stays in place while the plate is turned.
 
     Parameters
     ----------
     scene : Scene, optional
-        One scene, no family; without mass points. None is a machine that is still empty.
+        One scene, not a family, without mass points. None is an empty machine.
     partly : bool
-        Whether what the page cannot show is left out, instead of refused.
+        Whether parts that the page cannot show are left out instead of refused.
 
     Returns
     -------
     dict
-        ``scene``: its keys as its file has them, with a seed beyond 2**53 as text; ``stream`` is []
-        where there is none. ``tables``: of each key of each table (those outside of tables under
+        ``scene``: its keys as in its file, with a seed beyond 2**53 as text; ``stream`` is [] if
+        there is none. ``tables``: of each key of each table (those outside of tables under
         ``scene``) default, unit, low and high, its form as JSON Schema, and whether it is required;
-        of a table in a table the same of its ``parts``.
-        ``rules``: what contradicts what within a row of a table, by tables: keys, condition, id of
-        a text, and the other key in it.
-        ``presets``: the numbers of each material. ``parts``: see `PARTS`. Of an empty machine
-        ``examples``: scenes by name. Where something is left out ``lacks``: how many, by what it
-        is, and ``source``: the scene's file.
+        of a table in a table the same of its ``parts``. ``rules``: contradictions within a row of a
+        table, by tables: keys, condition, id of a text, and the other key in it. ``presets``: the
+        numbers of each material. ``parts``: see `PARTS`. Of an empty machine ``examples``: scenes
+        by name. If something is left out ``lacks``: numbers by kind, and ``source``: the scene's
+        file.
 
     Raises
     ------
     SceneError
-        If the page cannot show it: mass points, too many particles, or boxes and polygons with what
-        the contact engine has not beside them; or if the scene contradicts itself where it is
-        laid out.
+        If the page cannot show it: mass points, too many particles, or boxes and polygons with
+        features that the contact engine lacks for them; or if its geometry contradicts itself.
     """
     materials = {
         name: {key: getattr(preset.material, key) for key in VALUES}
@@ -136,7 +134,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         if not kind.outline:
             allowed = "more than 0; a page that answers shows what has a size"
             faults.append(Fault(f"{table}.radius", 0.0, allowed))
-    # Joints are told by the numbers of particles, of which some would be left out.
+    # Joints refer to numbers of particles, some of which would be left out.
     lacks += Counter(table for table, _ in scene.joints if foreign)
     for n, pair in enumerate(scene.pair):
         if (key := pair.clings) and scene.hinges:
@@ -175,14 +173,14 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     for key in EITHER:
         rows = tables.get(key, ())
         for row in (rows,) if isinstance(rows, dict) else rows:
-            # JavaScript's numbers have all digits of whole numbers up to here.
+            # JavaScript's numbers hold all whole numbers up to here.
             if row.get("seed", 0) > 2**53:
                 row["seed"] = str(row["seed"])
     return {"scene": tables, **common}
 
 
 def _leave_out(tables: dict[str, Any], scene: Scene, kinds: set[int]) -> None:
-    """Take kinds of particles out of the keys of a scene, their streams, and all joints."""
+    """Remove kinds of particles, their streams, and all joints from the keys of a scene."""
     names = {scene.particles[n].name for n in kinds}
     for table, gone in (
         ("particle", [n in kinds for n in range(len(scene.particles))]),
@@ -194,7 +192,7 @@ def _leave_out(tables: dict[str, Any], scene: Scene, kinds: set[int]) -> None:
         if kept := [row for row, out in zip(rows, gone, strict=False) if not out]:
             tables[table] = kept
     left = tables.setdefault("stream", [])
-    # That particles meet may have stood at one that is gone.
+    # `interact` may have been set in a stream that was removed.
     if scene.crowded and sum(stream.get("count", 1) for stream in left) > 1:
         left[0]["interact"] = True
     for table in (*JOINTS, "live"):
@@ -220,7 +218,7 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             if field.is_required():
                 rule["required"] = True
             rules[table][key] = rule
-    # Mass points are for another engine.
+    # Mass points need another engine.
     particle = rules["particle"]
     particle["radius"]["low"] = SHORTEST
     number, span = particle["radius"]["form"]["anyOf"]
@@ -254,7 +252,7 @@ SAID: Final = ("default", "description", "title", "x-unit", "x-words")
 
 
 def _form(rule: Any) -> Any:
-    """Return a JSON Schema without its words."""
+    """Return a JSON Schema without its texts."""
     if isinstance(rule, list):
         return [_form(part) for part in rule]
     if not isinstance(rule, dict):

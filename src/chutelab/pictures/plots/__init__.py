@@ -1,8 +1,8 @@
 """Pictures of recordings: `overlay`, `strobe`, and small functions that take and return `Axes`.
 
-`overlay` draws a recording on its analytic parabola, `strobe` a still for print: the scene with
+`overlay` draws a recording over its analytic parabola, `strobe` a still for print: the scene with
 particle 0 at round times, like a stroboscopic photograph. `paper_figure` draws the paper's figures
-computed anew, as printed on the left, corrected on the right.
+from computed values, as printed on the left, corrected on the right.
 
 ===============  ==================================================================================
 `style`          light or dark colours, language, text sizes, units; a figure that shows itself
@@ -103,19 +103,19 @@ def overlay(
     path : path, optional
         Also write the figure there, whole or not at all; the suffix says the format.
     ax : Axes, optional
-        Draw only the scene with its tracks, and into these; ``ax.legend()`` adds the legend.
+        Draw only the scene with its tracks, into these axes; ``ax.legend()`` adds the legend.
     details : bool
-        For experts: also the numerical error, the ledger's residual and the engine; and of a crowd
-        particle 0.
+        For experts: also the numerical error, the ledger's residual and the engine; for a crowd
+        also particle 0.
 
     Returns
     -------
     Figure
-        That of `ax`; or a new one, with scene and tracks, velocity and energy ledger beside it;
-        with `details` the distance from the analytic path beneath it. Of a crowd: the envelope of
-        its paths, beneath it where particles arrive and the belts' power, and beside it flow,
-        ledger and losses by surface. Where nothing is known analytically, of many particles, boxes
-        or strings: beneath it all particles at four moments.
+        That of `ax`; or a new one, with scene and tracks, and velocity and energy ledger beside it;
+        with `details` the distance from the analytic path beneath it. For a crowd: the envelope of
+        its paths, with arrivals and the belts' power beneath it, and flow, ledger and losses by
+        surface beside it. For many particles, boxes or strings without an analytic path: all
+        particles at four moments beneath it.
 
     Raises
     ------
@@ -197,9 +197,9 @@ def draw_view(
 ) -> Axes:
     """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend.
 
-    What moves is drawn where it begins, dashed, and where it is in the end. Of a `crowd` the
-    envelope of the paths instead of what particle 0 does. With `bodies` also the particles, at the
-    last moment at which half of them or more are there.
+    Moving surfaces are drawn at the beginning, dashed, and at the end. A `crowd` has the envelope
+    of the paths instead of particle 0's track. With `bodies` the particles are drawn, too, at the
+    last time at which at least half of them are in sight.
     """
     style.dress(ax, say("x"), say("y"))
     machine = recording.machine
@@ -235,7 +235,7 @@ def draw_sensors(ax: Axes, recording: Recording) -> Axes:
 
 
 def fullest(recording: Recording) -> float:
-    """Return the last of some even times, s, at which half of the most particles are in sight."""
+    """Return the last of some times, s, with half of the maximum number in sight."""
     clock = recording.knots["t"]
     times = np.linspace(clock.min(), clock.max(), 61)
     released = np.flatnonzero(recording.released)
@@ -244,7 +244,7 @@ def fullest(recording: Recording) -> float:
 
 
 def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording, *, crowd: bool) -> None:
-    """Draw the scene small, without names, with all particles, at four even times."""
+    """Draw the scene small, without names, with all particles, at four equally spaced times."""
     window, clock = window_of(recording), recording.knots["t"]
     room = place.get_position(figure)
     size = np.array([room.height * SIZE[1], room.width * SIZE[0]])
@@ -271,7 +271,7 @@ def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording, *, c
 
 
 WIDE = 185
-"""Characters of a line of text below the panels."""
+"""Most characters of a line of text below the panels."""
 
 ROLES: dict[str, tuple[str, Any]] = {
     "first": (BLUE, "-"),
@@ -281,17 +281,17 @@ ROLES: dict[str, tuple[str, Any]] = {
     "plate": ("#000000", "-"),
     "belt": (GREEN, "-"),
 }
-"""Colour and dashes of lines, which so are told apart without colour, too."""
+"""Colour and dashes of lines, which can be distinguished without colour, too."""
 
 MARGIN = 0.06
-"""Of the range of what is drawn, on each side."""
+"""Margin on each side, as a share of the range."""
 
 TEXT = 0.215
 """Height of a line of text, inches."""
 
 
 def paper_figure(found: PaperFigure) -> Picture:
-    """Draw a figure of the paper: panels side by side, and in words what the misprint does."""
+    """Draw a figure of the paper: panels side by side, and the misprint's effect in words."""
     texts = [fill(text, WIDE) for text in found.meaning]
     texts += [fill(f"Not in the paper's text: {text}", WIDE) for text in found.missing]
     lines = sum(text.count("\n") + 1 for text in texts)
@@ -304,7 +304,7 @@ def paper_figure(found: PaperFigure) -> Picture:
     )  # fmt: skip
     axes: list[Axes] = []
     for i, panel in enumerate(found.panels):
-        # Both of a pair have the same limits: the eye compares heights.
+        # Both panels of a pair have the same limits, since the eye compares heights.
         first = axes[-1] if i % 2 else None
         ax = figure.add_subplot(grid[i], sharex=first, sharey=first)
         axes.append(ax)
@@ -385,13 +385,13 @@ def strobe(
 def draw_times(ax: Axes, recording: Recording) -> Axes:
     """Write the time beside each strobe dot, on the first of `SIDES` where it hides nothing.
 
-    Its own dot must be the nearest of all to its middle, or it would be read as another's. Where no
-    side is free there is no time.
+    Its own dot must be the nearest to its middle, or it would be read as another's. If no side is
+    free, the time is left out.
     """
     times = strobe_times(recording)
     dots, _ = nominal(recording, times)
     digits = max(0, -floor(log10(strobe_step(recording)) + 1e-9))
-    # All in pixels from here on: dots, texts and lines that are drawn already.
+    # In pixels from here on: dots, texts and lines drawn so far.
     pixels = ax.transData.transform(dots)
     half, gap = np.array([0.4 * AWAY, 1.5]) * ax.figure.dpi / 72.0
     taken = [text.get_window_extent() for text in ax.texts]

@@ -1,10 +1,10 @@
 """The machine and its particles to scale.
 
-Pulleys, belts, plates, chutes, pegs and gates, with their names and with what lies behind their
-surfaces; disks of any size, boxes and polygons turned as they are, and strings.
+Pulleys, belts, plates, chutes, pegs and gates, with their names and their thickness; disks of any
+size, boxes and polygons at their angles, and strings.
 
 As in the live page, the surface that particles meet is the outer edge of a belt and the struck face
-of a plate; what is drawn of their thickness lies on the other side, and no engine knows of it.
+of a plate. Their thickness is drawn on the other side, and engines do not have it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from chutelab.util.arrays import Floats, Ints
 
 
 def halo() -> list[withStroke]:
-    """Return what keeps text readable where a line runs behind it."""
+    """Return an effect that keeps text readable over lines."""
     return [withStroke(linewidth=3.0, foreground=style.GROUND)]
 
 
@@ -40,34 +40,34 @@ TWO_LINES = 32.0
 """pt; height of two lines of small text."""
 
 THICK = (3.0, 8.0, 0.0165)
-"""Thickness of belts: at least and at most so many pt, and as a share of the axes' height."""
+"""Thickness of belts: least and most, pt, and as a share of the axes' height."""
 
 PLATE = 1.4
-"""Thickness of plates in that of belts."""
+"""Thickness of plates, in thicknesses of belts."""
 
 STRANDS = 4.5
-"""Of a belt without pulleys of its own: distance of its two strands in its thickness."""
+"""Distance of the two strands of a belt without its own pulleys, in its thicknesses."""
 
 HUB = 7.0
-"""pt of radius from which on a wheel has a hub."""
+"""Least radius of a wheel with a hub, pt."""
 
 HALF = 40
 """Points of half a circle."""
 
 BEHIND = 0.7
-"""Their z-order: below all surfaces, above the grid."""
+"""Z-order of volumes: below all surfaces, above the grid."""
 
 
 def thickness(ax: Axes) -> float:
-    """Return how thick belts are in these axes, pt."""
+    """Return the thickness of belts in these axes, pt."""
     least, most, share = THICK
     return min(most, max(least, share * ax.get_window_extent().height * 72.0 / ax.figure.dpi))
 
 
 def draw_volumes(ax: Axes, machine: Machine, points: float) -> dict[int, float]:
-    """Draw what lies behind a machine's surfaces, where a length of 1 m is so many pt.
+    """Draw the volumes behind a machine's surfaces; 1 m is so many pt.
 
-    Returns how far the strands of belts are from each other (m), by surfaces.
+    Returns the distance of the strands of belts (m), by surfaces.
     """
     thick, deep = thickness(ax) / points, {}
     own = [piece for piece in machine.pieces if not is_passing(machine, piece)]
@@ -87,7 +87,7 @@ def draw_volumes(ax: Axes, machine: Machine, points: float) -> dict[int, float]:
             deep[surface] = 2.0 * radius
             _loop(ax, centers, radius, max(radius - 1.15 * thick, 0.4 * radius), thick, points)
         elif flat and (name == "outgoing" or flat[0].speed):
-            # A belt without pulleys of its own: a loop below what it carries.
+            # A belt without its own pulleys: a loop below its carrying side.
             for piece in flat:
                 ends, length = piece.path(), float(piece.length)
                 ends = ends[np.argsort(ends[:, 0])]
@@ -97,7 +97,7 @@ def draw_volumes(ax: Axes, machine: Machine, points: float) -> dict[int, float]:
                 axes = ends + turn * np.array([way[1], -way[0]])
                 _loop(ax, axes, turn, max(turn - 1.6 * thick, 0.3 * turn), thick, points)
         for piece in flat if name in plates(machine) else ():
-            # The steel lies on the right of the struck face.
+            # The steel is on the right of the struck face.
             face, back = piece.path(), PLATE * thick * piece.normal(piece.at(0.5 * piece.way))
             outline = _closed(np.concatenate([face, face[::-1] - back]))
             _add(ax, outline, style.STEEL_LIGHT, style.STEEL)
@@ -129,9 +129,9 @@ def _closed(points: Floats) -> Path:
 
 
 def _loop(ax: Axes, axes: Floats, radius: float, wheel: float, thick: float, points: float) -> None:
-    """Draw a belt round two axes, its outer edge at a radius (m), on wheels of another."""
+    """Draw a belt round two axes, its outer edge at one radius (m), on wheels of another."""
     outer, inner = _stadium(axes, radius), _stadium(axes, radius - thick)
-    # What runs backward is a hole.
+    # An outline in the opposite direction is a hole.
     _add(ax, Path.make_compound_path(_closed(outer), _closed(inner[::-1])), style.BELT_BODY, "none")
     for center in axes:
         circle = Circle(tuple(center.tolist()), wheel, zorder=BEHIND + 0.1)
@@ -149,12 +149,12 @@ def pieces(machine: Machine) -> tuple[Pieces, ...]:
 
 
 def is_passing(machine: Machine, piece: Pieces) -> bool:
-    """Tell whether a piece is not always there, or not always at its place."""
+    """Whether a piece does not always exist, or moves."""
     return bool(piece.gate) or machine.mover(int(piece.surface)) is not None
 
 
 def colour_of(machine: Machine, piece: Pieces) -> str:
-    """Return the colour of a piece: of a belt, or of what stands still."""
+    """Return the colour of a piece: that of a belt, or of a surface at rest."""
     name = machine.surfaces[piece.surface]
     moves = name in ("incoming", "outgoing") or piece.speed != 0.0
     color: str = style.BELT if moves else style.STRIKE if name in plates(machine) else style.WALL
@@ -162,7 +162,7 @@ def colour_of(machine: Machine, piece: Pieces) -> str:
 
 
 def draw_piece(ax: Axes, machine: Machine, piece: Pieces, **look: Any) -> Circle | Line2D:
-    """Draw a piece to scale, filled if it is a circle that nothing is released in."""
+    """Draw a piece to scale, filled if it is a circle without releases inside."""
     color = look.pop("color", colour_of(machine, piece))
     gid = f"surface {machine.surfaces[piece.surface]}"
     if not (piece.whole and isinstance(piece, Arcs)):
@@ -171,7 +171,7 @@ def draw_piece(ax: Axes, machine: Machine, piece: Pieces, **look: Any) -> Circle
         line.set(solid_capstyle="butt", gid=gid, **look)
         return line
     out = np.hypot(*(machine.releases.position - piece.center).T) >= piece.radius
-    # The line of a small one must not make it larger than it is.
+    # The line must not make a small one look larger.
     radius = float(piece.radius)
     width = min(2.0, points_of(ax, 0.5 * radius))
     circle = Circle(tuple(piece.center.tolist()), radius if width == 2.0 else 0.75 * radius)
@@ -182,13 +182,13 @@ def draw_piece(ax: Axes, machine: Machine, piece: Pieces, **look: Any) -> Circle
 
 
 def points_of(ax: Axes, length: float) -> float:
-    """Return how many pt a length (m) is in the picture."""
+    """Return a length (m) in pt of the picture."""
     pixels = length * ax.get_window_extent().width / float(np.ptp(ax.get_xlim()))
     return pixels * 72.0 / ax.figure.dpi
 
 
 PASSAGE = 14.0
-"""pt; length of the arrow of what is solid from one side."""
+"""pt; length of the arrow at a surface that is solid from one side."""
 
 AXIS = 7.0
 """pt; size of the cross on the axis of a pulley."""
@@ -206,9 +206,9 @@ def draw_scene(
 
     Names keep clear of a path (P, 2), m, that is drawn later.
 
-    What is not always there, a gate, is dashed, and so is what moves, where the scene has it; what
-    is solid from one side has an arrow in the way in which it lets through. The limits of the axes
-    are set to hold the window at equal scales; by default all surfaces.
+    Gates are dashed, and so are moving surfaces, at their places in the scene file. Surfaces that
+    are solid from one side have an arrow in the direction in which they let particles through. The
+    limits of the axes hold the window at equal scales; by default all surfaces.
     """
     if window is None:
         ends = machine.corners
@@ -247,13 +247,13 @@ def draw_scene(
 
 
 def _passage(piece: Pieces) -> tuple[Floats, Floats]:
-    """Return the arrow of the way in which a piece lets through: tip (m), tail from there (pt)."""
+    """Return the arrow of a one-sided piece: tip (m), tail from there (pt)."""
     middle = piece.at(0.5 * piece.way)
     return middle, -PASSAGE * piece.one_sided * piece.normal(middle)
 
 
 def draw_last(ax: Axes, machine: Machine, t: float) -> Axes:
-    """Draw what moves where it is at a time (s), in thin lines."""
+    """Draw moving surfaces at a time (s), in thin lines."""
     movers = {mover.surface: mover for mover in machine.movers}
     for piece in pieces(machine) if movers else ():
         if mover := movers.get(int(piece.surface)):
@@ -264,29 +264,30 @@ def draw_last(ax: Axes, machine: Machine, t: float) -> Axes:
 
 
 Spot = tuple[Floats, tuple[float, float], str, str]
-"""Where a name stands: a point (m), the way from there (pt), and how it is aligned to both axes."""
+"""Place of a name: a point (m), the offset from there (pt), and its alignment along both axes."""
 
 GAP = 7.0
 """pt; between a surface and its name."""
 
 SHARES = (0.5, 0.25, 0.75, 0.0, 1.0)
-"""Where along a piece its name may stand, the best first."""
+"""Places along a piece for its name, the best first."""
 
 LOOKED_AT = 8
-"""Pieces of one surface beside which its name may stand."""
+"""Most pieces of one surface that are tried for its name."""
 
 FALL = 0.3
-"""Share of the window's height below a gate in which a name would be in the way of what falls."""
+"""Share of the window's height below a gate in which falling particles would cross a name."""
 
 FARTHER = (1.0, 2.5, 4.0)
-"""Gaps between a surface and its name, the best first."""
+"""Distances between a surface and its name, in gaps, the best first."""
 
 
 class _Names:
-    """Writes the name of each surface that is seen, once, where it hides least, and no other name.
+    """Writes the name of each visible surface once, where it hides least.
 
-    The axes have their limits and show what lies behind surfaces; `found` are the machine's pieces,
-    `shown` what is in the picture, `deep` how far the strands of belts are apart (m), by surfaces.
+    The axes have their limits and show the volumes behind surfaces; `found` are the machine's
+    pieces, `shown` those in the picture, `deep` the distances of the strands of belts (m), by
+    surfaces.
     """
 
     def __init__(
@@ -306,13 +307,13 @@ class _Names:
         self.found = found
         self.plates = plates(machine)
         self.thick = thickness(ax)
-        # Of what is drawn, wheels and steel are filled; a belt has room between its strands.
+        # Wheels and steel are filled; a belt has room between its strands.
         self.lines = [(Path(ax.transData.transform(line.get_xydata())), False) for line in ax.lines]
         for body in ax.patches:
             outline = body.get_path().transformed(body.get_patch_transform() + ax.transData)
             filled = to_rgba(body.get_edgecolor())[3] > 0.0
             self.lines += [(Path(corners), filled) for corners in outline.to_polygons()]
-        # What a gate lets through falls.
+        # Particles fall below a gate.
         fall = np.array([[0.0, 0.0], [0.0, -FALL * shown.height]])
         for piece in found:
             if piece.gate:
@@ -326,7 +327,7 @@ class _Names:
         self.taken: list[Bbox] = []
 
     def write(self) -> None:
-        """Write all names. One for which there is no room is left out."""
+        """Write all names. One without room is left out."""
         frame, points = self.ax.get_window_extent().padded(-3.0), 72.0 / self.ax.figure.dpi
         for surface, parts in self.parts.items():
             color = colour_of(self.machine, parts[0][0])
@@ -341,12 +342,12 @@ class _Names:
             for spot in self._spots(parts):
                 self._put(label, spot)
                 box, (where, offset, across, along) = label.get_window_extent(), spot
-                # Back over the edges of the axes.
+                # Move it back over the edges of the axes.
                 right = max(frame.x0 - box.x0, 0.0) + min(frame.x1 - box.x1, 0.0)
                 up = max(frame.y0 - box.y0, 0.0) + min(frame.y1 - box.y1, 0.0)
                 offset = (offset[0] + right * points, offset[1] + up * points)
                 placed, box = (where, offset, across, along), box.translated(right, up)
-                # Lines, circles and releases that it would stand on.
+                # Lines, circles and releases that it would cover.
                 on = (self.starts > box.min) & (self.starts < box.max)
                 hides = sum(line.intersects_bbox(box, filled=whole) for line, whole in self.lines)
                 hides += bool(on.all(axis=1).any())
@@ -368,7 +369,7 @@ class _Names:
         label.set(ha=across, va=along)
 
     def _said(self, surface: int, piece: Pieces) -> str:
-        """Return what is written at a surface, of which a piece is shown."""
+        """Return the text at a surface, a piece of which is shown."""
         called, speed = self.machine.surfaces[surface], float(piece.speed)
         if called in self.plates:
             x, y = piece.inward[0]
@@ -390,14 +391,14 @@ class _Names:
         return ", ".join([named(called), *([moves] if speed else []), *when])
 
     def _spots(self, parts: list[tuple[Pieces, Floats]]) -> Iterator[Spot]:
-        """Yield where the name of a surface may stand, the best first."""
+        """Yield places for the name of a surface, the best first."""
         piece, part = parts[0]
         name = self.machine.surfaces[piece.surface]
         low, high = sorted((part[0], part[-1]), key=lambda point: (point[1], point[0]))
         if name in self.plates:
             x, y = piece.inward[0]
             angle = degrees(np.arctan2(-x, y))
-            # Two lines need room above where they begin.
+            # Two lines need room above their beginning.
             room = TWO_LINES * self.ax.figure.dpi / 72.0
             room *= self.shown.height / self.ax.get_window_extent().height
             where = high
@@ -430,9 +431,9 @@ class _Names:
 
 
 def _beside(piece: Pieces, part: Floats, share: float) -> Iterator[tuple[Floats, Floats]]:
-    """Yield a point at a share of a piece's way, and the directions in which its name may stand.
+    """Yield a point at a share of a piece, and the directions for its name.
 
-    First to the side where no particle is expected: below.
+    The side where no particles are expected comes first: below.
     """
     if len(part) == 2:
         low, high = sorted(part, key=lambda point: (point[1], point[0]))
@@ -442,7 +443,7 @@ def _beside(piece: Pieces, part: Floats, share: float) -> Iterator[tuple[Floats,
     else:
         index = round(share * (len(part) - 1))
         if piece.whole:
-            # The lowest point of all of it is at its middle.
+            # The lowest point of a whole circle is at its middle.
             part = piece.path()[:-1]
             index = (int(part[:, 1].argmin()) + round((share - 0.5) * len(part))) % len(part)
         where = part[index]
@@ -461,16 +462,16 @@ def _spot(where: Floats, gap: float, normal: Floats) -> Spot:
 
 
 ARROWS = "→↗↑↖←↙↓↘"
-"""Which way a straight surface moves, in eighths of a turn."""
+"""Arrows for the direction of a straight surface, in eighths of a turn."""
 
 
 class Bodies:
-    """Some particles (n,) of one look, which can be moved: to scale, or magnified so as to be seen.
+    """Some particles (n,) of one look, which can be moved: to scale, or magnified to be visible.
 
     Disks of one size are a line of markers, others a collection of circles; boxes and polygons are
-    never magnified. The machine's largest disk is drawn at least `least` (pt) large, and others
-    magnified alike; disks have a white edge of `edge` (pt), which tells them apart where they
-    overlap. The axes have their limits; the `gid` of polygons has "turned" added to it.
+    never magnified. The machine's largest disk has a diameter of at least `least` (pt), and others
+    are magnified by the same factor. Disks have a white edge of `edge` (pt), which separates them
+    where they overlap. The axes have their limits; "turned" is added to the `gid` of polygons.
     """
 
     def __init__(
@@ -500,7 +501,7 @@ class Bodies:
             sizes = np.broadcast_to(machine.particle.radius, machine.count)[particles[self._round]]
             share = sizes / largest if largest else np.ones(len(sizes))
             sizes = share * max(points_of(ax, 2.0 * largest), least)
-            # No edge shall hide a small disk.
+            # The edge must not hide a small disk.
             edge = min(edge, 0.15 * float(sizes.min()))
             if np.ptp(sizes) == 0.0:
                 (self._disks,) = ax.plot(
@@ -525,7 +526,7 @@ class Bodies:
             self.artists.append(self._polygons)
 
     def move(self, position: Floats, angle: Floats) -> None:
-        """Set the particles to places, (n, 2), m, and angles, (n,), rad; NaN: it is not there."""
+        """Set the particles to places, (n, 2), m, and angles, (n,), rad; NaN hides one."""
         if isinstance(self._disks, Line2D):
             self._disks.set_data(*position[self._round].T)
         elif self._disks is not None:
@@ -546,14 +547,14 @@ def placed(outline: Floats, position: Floats, angle: float) -> Floats:
 
 
 LEAST = 1.5
-"""pt; the smallest diameter that the largest particle of a still picture is drawn with."""
+"""pt; least diameter of the largest particle in a still picture."""
 
 WHITE = 0.8
-"""pt; the edge that tells particles apart where they overlap."""
+"""pt; edge that separates particles where they overlap."""
 
 
 def draw_bodies(ax: Axes, recording: Recording, t: float, *, crowd: bool = False) -> Axes:
-    """Draw all particles and joints as they are at a time (s), in the colour of their stream.
+    """Draw all particles and joints at a time (s), in the colour of their stream.
 
     Unless they are a `crowd`, particle 0 has a colour of its own.
     """

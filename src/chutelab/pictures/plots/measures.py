@@ -1,7 +1,7 @@
-"""What is measured: of a run, beside its machine or on it, and on film, over the simulation.
+"""Pictures of measurements: of a run, and of points from a film.
 
 Wear as bands along the surfaces, fields, flow through sensors, loads, the velocity at an impact;
-points of a film, and how far they lie off.
+points of a film, and their residuals.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ from chutelab.util.arrays import Floats
 from chutelab.util.tables import many, number, plus_minus
 
 BANDS: Final = ("erosion", "abrasion")
-"""What bands show, a picture each."""
+"""Quantities of bands, one picture each."""
 
 
 def wear(recording: Recording, *, curves: bool = True) -> Picture:
-    """Draw where surfaces wear: bands on the machine, and each surface's four measures along it.
+    """Draw the wear of surfaces: bands on the machine, and four measures along each surface.
 
-    Bands are shares of the largest piece of all surfaces, curves of the largest of their surface.
-    Without `curves` there are the bands alone.
+    Bands are relative to the largest piece of all surfaces, curves to the largest of their surface.
+    Without `curves` there are only the bands.
     """
     told = touched(recording)
     rows = max(1, len(told))
@@ -81,7 +81,7 @@ def wear(recording: Recording, *, curves: bool = True) -> Picture:
 
 
 def draw_band(ax: Axes, told: dict[str, Wear], key: str) -> Axes:
-    """Draw bands along surfaces, coloured by shares of the largest piece of all, and their bar."""
+    """Draw bands along surfaces, coloured relative to the largest piece, and their bar."""
     every = [getattr(one, key) for one in told.values()]
     most = max((float(np.nanmax(values, initial=0.0)) for values in every), default=0.0)
     lines, shares = [], []
@@ -115,9 +115,9 @@ THIN: Final = 1e-3
 
 
 def field(recording: Recording, found: Fields, name: str) -> Picture:
-    """Draw a field in colours on the machine, with its bar; empty where next to nothing is.
+    """Draw a field in colours on the machine, with its bar; empty where density is small.
 
-    The bar is of what the picture shows.
+    The bar has the range of the picture.
     """
     figure = Picture((11.0, 7.0))
     figure.headline(0.04, 0.955, recording.title)
@@ -145,8 +145,9 @@ def field(recording: Recording, found: Fields, name: str) -> Picture:
 def drawing(recording: Recording) -> Picture:
     """Draw the machine to scale with the names of its parts and its main lengths.
 
-    These are how far the first plate's pivot is from the pulley's axis and the outgoing belt below
-    the pulley's top; of another machine its width and height, if all of it is in the picture.
+    These are the distance of the first plate's pivot from the pulley's axis and of the outgoing
+    belt from the pulley's top; for another machine its width and height, if all of it is in the
+    picture.
     """
     figure = Picture((11.0, 4.0))
     ax = style.dress(figure.add_axes((0.07, 0.14, 0.9, 0.82)), say("x"), say("y"))
@@ -190,7 +191,7 @@ BINS = 40
 
 
 def sensors(recording: Recording) -> Picture:
-    """Draw for each sensor of the scene the flow through it over time, and where it passes."""
+    """Draw for each sensor of the scene the flow over time, and the places of passages."""
     told = readings(recording)
     figure, pairs = in_pairs(recording, len(told))
     last = float(recording.knots["t"].max(initial=1e-9))
@@ -223,7 +224,7 @@ def in_pairs(recording: Recording, rows: int) -> tuple[Picture, list[tuple[Axes,
 
 
 def loads(recording: Recording) -> Picture:
-    """Draw for each surface that bears anything its forces over time, and the torque on it."""
+    """Draw for each loaded surface its forces over time, and the torque on it."""
     told = borne(recording)
     figure, pairs = in_pairs(recording, len(told))
     for (name, one), (left, right) in zip(told.items(), pairs, strict=True):
@@ -258,7 +259,7 @@ LETTERS = 14.0
 def split_velocity(
     recording: Recording, path: str | Path | None = None, *, surface: str = "plate"
 ) -> Picture:
-    """Draw the velocities before and after the first impact on a surface, and how they split.
+    """Draw the velocities before and after the first impact on a surface, with components.
 
     They are to scale, with the theory's symbols and no number: v_2 before and v_2' after, v_t along
     the surface, v_n into it, φ_2 between surface and v_2, α between surface and the vertical.
@@ -311,7 +312,7 @@ def _pair(place: Floats) -> tuple[float, float]:
 def _arrow(
     ax: Axes, tail: Floats, tip: Floats, color: str, said: str, aside: Floats, at: float = 0.5
 ) -> None:
-    """Draw an arrow, and its symbol on the side to which `aside` points, at a share of its way."""
+    """Draw an arrow, and its symbol at a share of its length, on the side of `aside`."""
     look = {"arrowstyle": "-|>", "color": color, "lw": 2.2, "shrinkA": 0.0, "shrinkB": 0.0}
     ax.annotate("", _pair(tip), _pair(tail), arrowprops={**look, "mutation_scale": 14.0})
     across, up = (0 if abs(part) < 0.3 else int(np.sign(part)) for part in aside)
@@ -340,18 +341,18 @@ def _angle(ax: Axes, at: Floats, one: Floats, other: Floats, radius: float, said
 
 
 PARAMETERS = 6
-"""Fitted parameters that are written into the figure."""
+"""Most fitted parameters that are written into the figure."""
 
 
 POINTS: dict[str, Any] = {"ls": "none", "marker": "+", "ms": 7.0, "mew": 1.3}
-"""How measured points are drawn."""
+"""Style of measured points."""
 
 
 def measured(found: Residuals, fit: Fit | None = None) -> Picture:
     """Draw a measured track over the simulation and its analytic parabola, and the residuals.
 
-    With a fit, whose residuals are its `after`, also, dotted, the track that it started from, and
-    the fitted values.
+    With a fit, whose residuals are `after`, the starting track is drawn, too, dotted, with the
+    fitted values.
     """
     figure = Picture((13.0, 7.6))
     lines = 0 if fit is None else min(len(fit.parameters), PARAMETERS)

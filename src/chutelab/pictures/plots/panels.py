@@ -66,7 +66,7 @@ class Arc:
 
 
 def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
-    """Return the flights of particle 0 that are known in closed form, in order.
+    """Return the flights of particle 0 that have a closed form, in order.
 
     With a plate they are the flight to it and the one from there to the belt, as far as the
     prediction goes. Without one it is the flight from the pulley down to the outgoing belt, if
@@ -95,7 +95,7 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
             return ()
     else:
         sine, cosine = sin(prediction.phi1), cos(prediction.phi1)
-        # The paper counts x3 back from the plate, and both y downwards.
+        # The paper's x3 points back from the plate, and both y downwards.
         legs = [
             (float(prediction.x2), float(prediction.y2), float(prediction.t2)),
             (-float(prediction.x3), float(prediction.y3), float(prediction.t3)),
@@ -124,7 +124,7 @@ ROUNDING = 2.0**-52
 """m; the spacing of floating-point numbers at 1 m."""
 
 FLOOR = 1e-17
-"""m; the lower end of the residual's axis, where an exact zero is drawn."""
+"""m; lower end of the residual's axis, where an exact zero is drawn."""
 
 
 def analytic_of(
@@ -132,7 +132,7 @@ def analytic_of(
 ) -> tuple[tuple[Arc, ...], float]:
     """Return the arcs known analytically, and the time (s) of the recording at which they begin.
 
-    They are those of the recording's own prediction if none is given.
+    By default they are those of the recording's own prediction.
     """
     left = float(each(recording, "separation.t")[0])
     if isnan(left):
@@ -143,8 +143,9 @@ def analytic_of(
 def draw_tracks(ax: Axes, recording: Recording, *, marks: bool = True) -> Axes:
     """Draw particle 0's track over the others', with strobe dots at round times and impact markers.
 
-    The others' are thin and translucent, each in the colour of its stream. Without `marks` there
-    are neither dots nor markers, and particle 0's is one of them if there are others.
+    The others' tracks are thin and translucent, in the colour of their stream. Without `marks`
+    there are neither dots nor markers, and particle 0's track looks like the others, if there are
+    any.
     """
     chosen = drawn_tracks(recording)
     alike = not marks and len(chosen) > 1
@@ -199,8 +200,8 @@ def draw_residual(
 ) -> Axes:
     """Draw the distance between simulated and analytic positions of particle 0, on a log scale.
 
-    `parts` and `start` are of `analytic_of`; without arcs the panel says so. `reason` says why
-    there is no analytic parabola, or none to the end.
+    `parts` and `start` come from `analytic_of`; without arcs the panel says so. `reason` says why
+    there is no analytic parabola, or why it ends early.
     """
     then = say("residual-then", reason=reason) if reason else ""
     axis = say("residual-axis", note=shorten(then, 95, placeholder=" …"))
@@ -215,7 +216,7 @@ def draw_residual(
     times = _times_of(parts)
     known, _ = flight(parts, times)
     clock, end = start + times, float(recording.track(0)["t"][-1])
-    # A sum may pass the end by rounding, where there is no position any more.
+    # By rounding a sum may pass the end, after which there is no position.
     clock = np.where(np.isclose(clock, end, rtol=1e-12, atol=0.0), end, clock)
     distance = np.hypot(*(nominal(recording, clock)[0] - known).T)
     flying = np.isfinite(distance)
@@ -255,7 +256,7 @@ def draw_velocity(
     box = ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85).get_window_extent()
     paths = (line.get_path().transformed(line.get_transform()) for line in ax.lines)
     if any(path.intersects_bbox(box, filled=False) for path in paths):
-        # No place is free: it gets a strip of its own.
+        # No place is free, so it gets its own strip.
         low, high = ax.get_ylim()
         ax.set_ylim(low, high + 0.2 * (high - low))
         ax.legend(fontsize=style.SMALL, loc="upper center", ncols=2, framealpha=0.85)
@@ -268,15 +269,15 @@ def _beyond(times: Floats) -> float:
 
 
 SHOWN = 1e-9
-"""A residual of more than this part of what was put in is no rounding."""
+"""A residual larger than this share of the energy put in is not rounding."""
 
 
 def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes:
     """Draw the energy ledger of all particles over time.
 
     Kinetic and potential energy and both losses are stacked; energy at release plus belt work is a
-    line. The line runs along the top of the stack but for the residual, which the title states:
-    always with `details`, and otherwise if it is more than rounding.
+    line. The line is at the top of the stack except for the residual, which the title states:
+    always with `details`, otherwise if it is more than rounding.
     """
     t = recording.knots["t"]
     times = np.linspace(t.min(), t.max(), 240)
@@ -316,13 +317,13 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
 
 
 EDGES = {"low": f"{100 * QUANTILES[0]:.0f}", "high": f"{100 * QUANTILES[-1]:.0f}"}
-"""Per cent between which most are."""
+"""Percentiles that enclose most particles."""
 
 
 def draw_envelope(ax: Axes, recording: Recording) -> Axes:
-    """Draw for each stream the band in which all but few of its paths lie, and the middle one.
+    """Draw for each stream the envelope of its paths, and the middle path.
 
-    A legend names them once; which stream has which colour is told by its particles.
+    A legend names them once; the colours of streams are in the legend of the particles.
     """
     streams, paths = recording.machine.streams, envelopes(recording)
     colours = stream_colours(len(streams))
@@ -340,9 +341,9 @@ def draw_envelope(ax: Axes, recording: Recording) -> Axes:
 
 
 def draw_arrivals(ax: Axes, recording: Recording, title: str | None = None) -> Axes:
-    """Draw how many particles arrive where on the outgoing belt, with the mean and the spread.
+    """Draw the distribution of arrivals on the outgoing belt, with mean and spread.
 
-    Of a bed, the landings of the lowest and the highest layer are marked.
+    For a bed, the landings of the lowest and the highest layer are marked.
     """
     found = arrivals(recording)["position"][:, 0]
     found = found[np.isfinite(found)]
@@ -351,7 +352,7 @@ def draw_arrivals(ax: Axes, recording: Recording, title: str | None = None) -> A
     if len(found) == 0:
         return ax
     mean, deviation = float(found.mean()), float(found.std())
-    # All that arrive in one place still make a bar.
+    # If all arrive in one place, there is still a bar.
     edges = 24 if np.ptp(found) > 1e-9 else [mean - 5e-4, mean + 5e-4]
     ax.hist(found, bins=edges, color=style.STREAM)
     ax.axvspan(mean - deviation, mean + deviation, color=style.MUTED, alpha=0.2, gid="spread")
@@ -372,10 +373,10 @@ def draw_arrivals(ax: Axes, recording: Recording, title: str | None = None) -> A
 
 
 def draw_flow(ax: Axes, recording: Recording) -> Axes:
-    """Draw how many particles have been released, have arrived and have left, over time.
+    """Draw the numbers of particles released, arrived and left, over time.
 
-    The steeper, the larger the flow; the remark says what arrives, as the summary does.
-    Where all are there from the start and none comes or goes: how fast they are.
+    A steeper line is a larger flow; the remark has the rate of arrivals, as in the summary. If all
+    particles are there from the start and none comes or goes, their speeds are drawn.
     """
     style.dress(ax, say("time"), say("particles"), say("flow"))
     first, last = recording.ends()
@@ -400,7 +401,7 @@ def draw_flow(ax: Axes, recording: Recording) -> Axes:
 
 
 def draw_speeds(ax: Axes, recording: Recording) -> Axes:
-    """Draw the speeds of all particles over time: the middle one, and between which most are."""
+    """Draw the speeds of all particles over time: median and the range of most."""
     clock = recording.knots["t"]
     times = np.linspace(clock.min(), clock.max(), 200)
     speeds = np.hypot(*np.moveaxis(recording.at(times)[1], 2, 0))
@@ -415,7 +416,7 @@ def draw_speeds(ax: Axes, recording: Recording) -> Axes:
 
 
 def draw_power(ax: Axes, recording: Recording) -> Axes:
-    """Draw what all drives pay over time: the mean power in each of 40 parts of the run."""
+    """Draw the power of all drives over time: the mean in each of 40 parts of the run."""
     clock = recording.knots["t"]
     times = np.linspace(clock.min(), clock.max(), 41)
     paid = recording.energy_at(times)["belt_work"]
@@ -430,7 +431,7 @@ def draw_power(ax: Axes, recording: Recording) -> Axes:
 
 
 MOST_SURFACES = 6
-"""Surfaces whose losses are told; of more, those that take most."""
+"""Most surfaces whose losses are shown: those with the largest losses."""
 
 
 def draw_losses(ax: Axes, recording: Recording) -> Axes:

@@ -1,4 +1,4 @@
-"""What of a recording is worth drawing: particles, times, energies, and the part of the world."""
+"""Choices for pictures of a recording: particles, times, energies, part of the world."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.errors import InputError
 
 STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
-"""Kinds of event in which something is hit."""
+"""Kinds of events in which something is hit."""
 
 
 def subset(recording: Recording, particles: Sequence[int] | Ints) -> Recording:
@@ -71,10 +71,10 @@ def round_times(begin: float, end: float, step: float) -> Floats:
 
 
 def action(recording: Recording) -> tuple[float, float]:
-    """Return when particle 0 begins to do something, and when it ends, s.
+    """Return the beginning and end of particle 0's action, s.
 
-    It begins at its separation from the incoming belt, or at its release if it is not carried to
-    one; an `InputError` if it never was released.
+    It begins at its separation from the incoming belt, or at its release without a separation; an
+    `InputError` if it was never released.
     """
     track = recording.track(0)
     if not len(track):
@@ -92,7 +92,7 @@ def struck_by_nominal(recording: Recording) -> NDArray[Any]:
 
 
 def strobe_step(recording: Recording) -> float:
-    """Return the round time between strobe dots, s, made for the time until the last impact."""
+    """Return the round time between strobe dots, s, chosen for the time until the last impact."""
     begin, end = action(recording)
     struck = struck_by_nominal(recording)["t"]
     last = float(struck[-1]) if len(struck) and struck[-1] > begin else end
@@ -106,7 +106,7 @@ def strobe_times(recording: Recording) -> Floats:
 
 
 FINE = 2e-4
-"""Share of what is seen by which a line that is drawn may miss the curve."""
+"""Share of the visible extent by which a drawn line may miss the curve."""
 
 
 def track_times(
@@ -117,13 +117,13 @@ def track_times(
     particle: int = 0,
     fine: float | None = None,
 ) -> Floats:
-    """Return times at which a track is to be drawn: straight lines between them miss it by `fine`.
+    """Return times for drawing a track: straight lines between them miss it by `fine`.
 
-    They are its knots, the moments just before jumps, which are so drawn upright, and even parts
-    of each piece, as many as its curvature asks for: over a time h a chord misses a curve by at
-    most h²/8 times its largest acceleration, and a cubic has that at one of its ends. By default
-    `fine` (m) is the share `FINE` of the track's extent, and it is all of the track that is drawn,
-    else from `begin` to `end`, s.
+    They are its knots, the moments just before jumps, which are thus drawn vertically, and equal
+    parts of each piece, as many as its curvature requires: over a time h a chord misses a curve by
+    at most h²/8 times its largest acceleration, and a cubic has that at one of its ends. By default
+    `fine` (m) is the share `FINE` of the track's extent, and the whole track is drawn, else from
+    `begin` to `end`, s.
     """
     track = recording.track(particle)
     t, place, velocity = track["t"], track["position"], track["velocity"]
@@ -151,7 +151,7 @@ def path_of(recording: Recording, particle: int, fine: float) -> Floats:
     """Return the points of a line that misses a particle's track by about `fine` (m), (P, 2)."""
     times = track_times(recording, particle=particle, fine=fine)
     place = subset(recording, [particle]).at(times)[0][:, 0]
-    # What lies still or creeps has thousands of knots in one place.
+    # A track at rest or creeping has thousands of knots in one place.
     cell = np.floor(place / fine)
     kept = np.append(np.any(cell[1:] != cell[:-1], axis=1), True)
     kept[0] = True
@@ -159,18 +159,18 @@ def path_of(recording: Recording, particle: int, fine: float) -> Floats:
 
 
 def upright(times: Floats, jumps: Floats) -> Floats:
-    """Return ascending times joined by jumps between the first and last, and just before each."""
+    """Return ascending times with the jumps between the first and last, and just before each."""
     jumps = jumps[(jumps >= times[0]) & (jumps <= times[-1])]
     before = np.nextafter(jumps, -np.inf)
     return np.unique(np.concatenate([times, jumps, before[before >= times[0]]]))
 
 
 def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
-    """Return the ledger at times (T,), J, with potential energy above 0: it can be stacked.
+    """Return the ledger at times (T,), J, with positive potential energy, for stacking.
 
-    It is what `Recording.energy_at` gives, and ``start``, kinetic and potential energy at the
-    release of all particles released so far. Potential energy is counted from the lowest point of
-    the particles that stay in the scene (of all, if it is negative otherwise).
+    It is `Recording.energy_at` with ``start``, kinetic and potential energy at the release of all
+    particles released so far. Potential energy is relative to the lowest point of the particles
+    that stay in the scene (of all, if it were negative otherwise).
     """
     balance = recording.energy_at(times)
     first, _ = recording.ends()
@@ -200,10 +200,10 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
 
 
 def _hang(balance: dict[str, Floats], mover: Mover, recording: Recording, times: Floats) -> None:
-    """Put what hangs on a hinge into a ledger at times (T,), J.
+    """Add hinges to a ledger at times (T,), J.
 
-    Of what it has, and its damper and its stops took, what touches it has given as much as it
-    lost; the rest is its motor's work, on the row of all drives.
+    Of its energy, and of the losses at its damper and stops, contacts have given as much as they
+    lost; the rest is its motor's work, in the row of all drives.
     """
     hinge = mover.hinge
     assert hinge is not None
@@ -212,7 +212,7 @@ def _hang(balance: dict[str, Floats], mover: Mover, recording: Recording, times:
     if len(recording.stopped):
         taken = recording.stopped[recording.swings["surface"] == mover.surface]
         stopped = np.interp(times, t, taken)
-    # Gauss's rule of three places is exact for the square of a parabola, the rate between states.
+    # Gauss's rule of three points is exact for the square of a parabola, the rate between states.
     places, weights = np.polynomial.legendre.leggauss(3)
     within = t[:-1, None] + 0.5 * np.diff(t)[:, None] * (1.0 + places)
     power = hinge.damper * hinge.at(within)[1] ** 2
@@ -232,9 +232,9 @@ def _hang(balance: dict[str, Floats], mover: Mover, recording: Recording, times:
 
 
 def flow(recording: Recording) -> dict[str, Floats]:
-    """Return when particles are released, have arrived and have left for good, s.
+    """Return the times of releases, arrivals and final exits of particles, s.
 
-    Of the last two only what any of them does in the end.
+    Arrivals and exits are those of the particles that have them.
     """
     first, last = recording.ends()
     come = arrivals(recording)["t"]
@@ -243,36 +243,36 @@ def flow(recording: Recording) -> dict[str, Floats]:
 
 
 MANY = 60
-"""Particles from which on some may stray out of the window."""
+"""With at least so many particles, some may be outside the window."""
 
 
 def as_crowd(recording: Recording) -> bool:
-    """Tell whether pictures lead with all particles, and show particle 0 on request only."""
+    """Whether pictures are about all particles, and show particle 0 only on request."""
     return recording.count >= FEWEST
 
 
 def one_of_many(recording: Recording) -> bool:
-    """Tell whether pictures show what all particles do, not the way of particle 0.
+    """Whether pictures show the motion of all particles, not the path of particle 0.
 
-    They do if there are many, and no conveyor brings one after the other.
+    They do if there are many, and no conveyor brings them one after the other.
     """
     return recording.count > MANY and recording.machine.pulley is None
 
 
 def bodily(recording: Recording) -> bool:
-    """Tell whether all particles are to be seen: `one_of_many`, boxes, polygons, or on strings."""
+    """Whether all particles are shown: `one_of_many`, boxes, polygons, or on strings."""
     machine = recording.machine
     corners = any(outline is not None for outline in machine.outlines)
     return one_of_many(recording) or corners or bool(machine.joints)
 
 
 def stays(recording: Recording) -> Bools:
-    """Tell which particles are still to be seen after their end, (N,): those of many that lie."""
+    """Return which particles are still shown after their end, (N,): of many, those at rest."""
     return np.asarray(recording.ended_by("settled") & (recording.count > MANY))
 
 
 def places(recording: Recording, particles: Sequence[int] | Ints, times: Floats) -> Floats:
-    """Return where some particles are to be seen, (T, n, 2), m; NaN where they are not."""
+    """Return the places of some particles, (T, n, 2), m; NaN when they are not shown."""
     some = subset(recording, particles)
     position = some.at(times)[0]
     for i in np.flatnonzero(stays(recording)[np.asarray(particles, dtype=np.int64)]).tolist():
@@ -282,7 +282,7 @@ def places(recording: Recording, particles: Sequence[int] | Ints, times: Floats)
 
 
 STREAM_TRACKS, FEW_TRACKS = 60, 12
-"""Most tracks that are drawn: of a stream, and of many particles that are there at once."""
+"""Most tracks that are drawn: for a stream, and for many particles at once."""
 
 
 def drawn_tracks(recording: Recording) -> Ints:
@@ -292,10 +292,10 @@ def drawn_tracks(recording: Recording) -> Ints:
 
 
 def paid_by(recording: Recording) -> str:
-    """Return what gives the energy that pictures show: "belt_work", "drives", or "hinges", too.
+    """Return the name of the energy input in pictures: "belt_work", "drives", or "hinges".
 
-    What hands do to plates, and in Pymunk what stops take, is known of whole runs only: there it is
-    what hangs on a hinge that gives energy, or takes it, and has none of its own.
+    Work by hand on plates, and in Pymunk the loss at stops, is known only for whole runs. Then
+    hinges have no energies of their own, but give or take energy.
     """
     hinges = [one.hinge for one in recording.machine.movers if one.hinge]
     untold = not len(recording.stopped)
@@ -305,11 +305,11 @@ def paid_by(recording: Recording) -> str:
 
 
 POSES = 61
-"""Times of a run at which it is asked how far what moves reaches."""
+"""Times of a run at which the extent of moving surfaces is computed."""
 
 NEARBY, FAR = 0.35, 1.0
 """Margins around the action, in shares of its size: within the first, ends of belts are shown;
-within the second, ends of surfaces at rest, and what happens later."""
+within the second, ends of surfaces at rest, and later events."""
 
 
 @dataclass(frozen=True)
@@ -332,7 +332,7 @@ class Window:
         return self.top - self.bottom
 
     def padded(self, left: float, right: float, bottom: float, top: float) -> Window:
-        """Return a window larger by shares of its own larger side."""
+        """Return a window extended by shares of its own larger side."""
         size = max(self.width, self.height)
         shifts = np.array([-left, right, -bottom, top]) * size
         return Window(*(np.array(astuple(self)) + shifts).tolist())
@@ -350,7 +350,7 @@ class Window:
         return Window(least[0], most[1], least[2], most[3])
 
     def holds(self, points: Floats) -> Bools:
-        """Tell which points, (..., 2), lie inside."""
+        """Return which points, (..., 2), are inside."""
         x, y = points[..., 0], points[..., 1]
         return np.asarray(
             (x >= self.left) & (x <= self.right) & (y >= self.bottom) & (y <= self.top)
@@ -365,7 +365,7 @@ class Window:
         along = end - start
         low, high = 0.0, 1.0
         for axis, (lower, upper) in enumerate(((self.left, self.right), (self.bottom, self.top))):
-            if abs(along[axis]) < 1e-300:  # no way at all, and a division by it may overflow
+            if abs(along[axis]) < 1e-300:  # no displacement, and a division by it may overflow
                 if not lower <= start[axis] <= upper:
                     return None
                 continue
@@ -375,13 +375,13 @@ class Window:
 
 
 def window_of(recording: Recording) -> Window:
-    """Return the window in which something happens, with room for labels; `[view]` overrides it.
+    """Return the window of the action, with room for labels; `[view]` overrides it.
 
     It holds particle 0 from separation (or release, without one) to its landing (or last impact),
-    the pulley, where the others are released and strike something, and the ends of surfaces near
-    there; of what comes later, and of the fall of what leaves the scene, as much as does not make
-    all else small. Where particle 0 is not the one that matters, see `bodily`, or there are several
-    streams, it holds all particles alike.
+    the pulley, the places where the others are released and strike something, and the ends of
+    surfaces near there. Of later motion, and of the fall of particles that leave, it holds as much
+    as does not make everything else small. If particle 0 is not the important one, see `bodily`, or
+    there are several streams, it holds all particles.
     """
     machine, many = recording.machine, one_of_many(recording)
     if (view := recording.scene.view) is not None:
@@ -391,7 +391,7 @@ def window_of(recording: Recording) -> Window:
     together = bodily(recording) or len(machine.streams) > 1
     points = [np.concatenate([path, crowd]) if together else path]
     if bodily(recording):
-        # All that come to lie somewhere: of a heap its feet, which few strike.
+        # All particles that come to rest, such as those at the foot of a heap, which few strike.
         stays = recording.ended[recording.released] != REASONS.index("exit")
         points.append(recording.ends()[1]["position"][stays])
         tracks = [recording.track(i)["position"] for i in drawn_tracks(recording).tolist()]
@@ -420,11 +420,11 @@ def window_of(recording: Recording) -> Window:
             placed = np.concatenate([mover.carried(own, time) for time in times])
             points.append(placed[far.holds(placed)])
     points.append(around(np.concatenate(points)).padded(*[NEARBY] * 4).nearest(fall))
-    # Names stand left of the pulley and behind the plate.
+    # Names are left of the pulley and behind the plate.
     left = 0.06 if machine.pulley is None else 0.24
     right = 0.22 if "plate" in machine.surfaces else 0.06
     held = np.concatenate(points)
-    # Large particles are seen whole.
+    # Large particles are shown whole.
     reach = 1.1 * float(np.max(machine.particle.radius))
     whole = around(np.concatenate([held - reach, held + reach]))
     return around(held).padded(left, right, 0.10, 0.12).joined(whole)
@@ -433,7 +433,7 @@ def window_of(recording: Recording) -> Window:
 def _path(recording: Recording) -> tuple[Floats, Floats, Floats]:
     """Return particle 0's positions up to landing or last impact, from there on, and as it falls.
 
-    What falls has left the scene, and touched nothing since.
+    A falling particle has left the scene and touched nothing since.
     """
     begin, end = action(recording)
     events = recording.events[recording.events["particle"] == 0]
@@ -441,7 +441,7 @@ def _path(recording: Recording) -> tuple[Floats, Floats, Floats]:
     events = events[~gone & (events["t"] > begin)]
     rests = float(events["t"][-1]) if gone.any() and len(events) else end
     struck = struck_by_nominal(recording)
-    # What it struck before, on the way to the end of a ramp, is not where it goes.
+    # Impacts before that, on the way to the end of a ramp, do not count.
     struck = struck[struck["t"] > begin]
     landed = struck["t"][struck["kind"] == Kind.LANDING]
     last = landed[0] if len(landed) else struck["t"][-1] if len(struck) else rests
@@ -452,10 +452,10 @@ def _path(recording: Recording) -> tuple[Floats, Floats, Floats]:
 
 
 def _crowd(recording: Recording, begin: int) -> Floats:
-    """Corners of boxes around where particles from the number `begin` on strike or are released.
+    """Corners of boxes around impacts and releases of particles from number `begin` on.
 
-    Of many the middle 96 % of the impacts count. Where they are released counts if no belt carries
-    them from there. What meets on its fall below all surfaces meets at their bottom.
+    With many, the middle 96 % of the impacts count. Releases count unless a belt carries the
+    particles from there. Collisions below all surfaces count at their bottom.
     """
     events = recording.events[recording.events["particle"] >= begin]
     left = events[events["kind"] == Kind.SEPARATION]
@@ -482,7 +482,7 @@ def around(points: Floats) -> Window:
 
 
 def motion(recording: Recording, particles: Ints, times: Floats) -> tuple[Floats, Floats]:
-    """Return where particles are seen, (T, n, 2), and how far turned, (T, n), if that is seen."""
+    """Return the places of particles, (T, n, 2), and angles, (T, n), if visible."""
     position = places(recording, particles, times)
     if all(outline is None for outline in recording.machine.outlines):
         return position, np.zeros(position.shape[:2])
@@ -495,19 +495,19 @@ def motion(recording: Recording, particles: Ints, times: Floats) -> tuple[Floats
 
 
 HANGING = np.linspace(0.0, 1.0, 13)
-"""Shares of a slack string's way at which it is drawn."""
+"""Shares of a slack string's length at which points are drawn."""
 
 
 COIL = 0.05
-"""Of a spring's length at rest; half of its width."""
+"""Half of a spring's width, as a share of its length at rest."""
 
 
 def strings(recording: Recording, times: Floats) -> Callable[[int], list[Floats]]:
     """Return the function that gives the joints at the time of an index, (P, 2) each, m.
 
-    A slack string sags along gravity between its ends, a spring goes to and fro; pins are left out.
+    A slack string sags along gravity between its ends, a spring is a zigzag; pins are left out.
     """
-    # Over a pulley a string is two, each as slack as the other.
+    # A string over a pulley has two parts, equally slack.
     joints = [joint for joint in recording.machine.joints if joint.kind != "pin"]
     joints += [
         replace(joint, particle=joint.other, other=joint.particle) for joint in joints if joint.over
@@ -530,7 +530,7 @@ def strings(recording: Recording, times: Floats) -> Callable[[int], list[Floats]
             way = end - begin
             path = begin + HANGING[:, None] * way
             if joint.kind == "string":
-                # Pulled down at its middle it would be twice as deep there.
+                # If it were pulled down at its middle, it would be twice as deep there.
                 sag = np.sqrt(max(long**2 - float(way @ way), 0.0))
                 path -= (2.0 * HANGING * (1.0 - HANGING) * sag)[:, None] * recording.machine.up
             elif joint.kind == "spring":

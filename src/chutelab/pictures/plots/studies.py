@@ -37,14 +37,14 @@ from chutelab.util.tables import plus_minus
 
 BARS = (BLUE, SKY)
 KINDS = (SKY, ORANGE, GREEN, VERMILION, GREY)
-"""Colours of the kinds of outcome; the last one also of all that follow."""
+"""Colours of the kinds of outcome; the last one also for all further ones."""
 
 MISSING = "///"
-"""Hatch over what never meets the plate."""
+"""Hatch where the plate is never met."""
 
 
 def scan(solution: Solution) -> Picture:
-    """Draw what a search over one key looked at: the quantity, its target, answers and jumps.
+    """Draw a search over one key: the quantity, its target, answers and jumps.
 
     Each smooth piece is a line, so that jumps are gaps. Raises a `ValueError` if several keys were
     varied.
@@ -139,7 +139,7 @@ def _searched(solution: Solution) -> Picture:
 def repeats(found: Repeats) -> Picture:
     """Draw each quantity over seeds: dots are runs, bars the standard error of their mean.
 
-    Quantities that all seeds agree on are left out.
+    Quantities that are equal for all seeds are left out.
     """
     rows = [(row, one) for row, one in found.shown() if one.error > 0.0 and one.mean]
     figure = Picture((9.0, 1.6 + 0.19 * len(rows)))
@@ -161,7 +161,7 @@ def repeats(found: Repeats) -> Picture:
 
 
 def spread(found: Uncertainty) -> Picture:
-    """Draw how uncertain inputs spread: distribution, strongest input, and each one's share."""
+    """Draw the effect of uncertain inputs: distribution, strongest input, and shares."""
     rows = len(found.quantities)
     height = 1.4 + 3.1 * rows
     figure = Picture((13.0, height))
@@ -226,7 +226,7 @@ def draw_strongest(ax: Axes, found: Uncertainty, row: int) -> Axes:
 
 
 def draw_shares(ax: Axes, found: Uncertainty, row: int) -> Axes:
-    """Draw the share of the variance that each input explains, alone and with its interactions."""
+    """Draw the share of the variance that each input explains, alone and with interactions."""
     indices = found.indices[row]
     name = found.quantities[row]
     style.dress(ax, "share of the variance, %", "", f"{name}: what the spread comes from")
@@ -262,12 +262,12 @@ def _titles(figure: Picture, title: str, text: str, wide: int = 95) -> None:
 
 
 MOST_LINES, DOTS = 8, 60
-"""Values of a second key up to which each has a line (more make a heat map), and values up to which
-a line shows where they are."""
+"""Most values of a second key with a line each (more make a heat map), and most values of a line
+with markers."""
 
 COLORS, LIGHTEST = "viridis", 0.88
-"""From dark to light with growing values, also for colour-blind readers and in print; the share of
-it that is used for lines: what follows is too light on white."""
+"""From dark to light with growing values, also for colour-blind readers and in print; and the share
+of it that is used for lines, as the rest is too light on white."""
 
 
 def sweep_figure(swept: Sweep, column: str) -> Picture:
@@ -295,7 +295,7 @@ def sweep_figure(swept: Sweep, column: str) -> Picture:
 def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
     """Draw one column: lines, a heat map over two keys with many values, or dots of samples.
 
-    Dots over two keys have their values as colours; crosses are where there is none.
+    Dots over two keys have their values as colours; crosses are missing values.
     """
     keys = [key for key in swept.quantities if len(np.unique(swept.columns[key])) > 1]
     if len(keys) > 2:
@@ -352,14 +352,14 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
             handlelength=1.4, borderaxespad=0.2, alignment="right",
         )  # fmt: skip
     low, high = float(first.min()), float(first.max())
-    if low < high:  # all of the range, also where there are no rows
+    if low < high:  # the whole range, even without rows
         margin = 0.03 * (high - low)
         ax.set_xlim(low - margin, high + margin)
     return ax
 
 
 def draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> ScalarMappable:
-    """Draw a heat map; grey where there is nothing to tell, hatched where the plate is missed."""
+    """Draw a heat map; grey where values are missing, hatched where the plate is missed."""
     (x, across), (y, up) = (np.unique(values, return_inverse=True) for values in (x, y))
     field = np.full((len(y), len(x)), np.nan)
     field[up, across] = z
@@ -367,7 +367,7 @@ def draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> Scal
     ax.grid(visible=False)
     limits: dict[str, Any] = {"cmap": COLORS}
     if np.nanmin(field, initial=0.0) < 0.0 < np.nanmax(field, initial=0.0):
-        # White where the sign changes: that is often what is looked for.
+        # White where the sign changes, which is often the question.
         reach = float(np.nanmax(np.abs(field)))
         limits = {"cmap": "RdBu_r", "vmin": -reach, "vmax": reach}
     mesh = ax.pcolormesh(x, y, field, shading="nearest", rasterized=True, **limits)
@@ -389,7 +389,7 @@ def draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> Scal
 
 
 METHOD_COLOURS = (ORANGE, GREEN, VERMILION, PURPLE, GREY)
-"""Of the methods of discharge, in their order."""
+"""Colours of the methods of discharge, in their order."""
 
 METHOD_LINES = ("-", (0, (5.0, 1.5)), "-.", (0, (1.5, 1.0)), (0, (7.0, 1.5, 1.5, 1.5)))
 """Their lines, for readers without colours."""
@@ -400,7 +400,7 @@ HEIGHTS_OF_BAND = 80
 
 
 def discharge_figure(found: SideBySide) -> Picture:
-    """Draw the stream as engineers' methods have it over the one that is simulated."""
+    """Draw the stream by engineers' methods over the simulated one."""
     figure = Picture((9.6, 7.2))
     ax = figure.add_axes((0.08, 0.08, 0.89, 0.74))
     style.dress(ax, "x, m", "y, m")
@@ -410,7 +410,7 @@ def discharge_figure(found: SideBySide) -> Picture:
     right = float(np.nanmax(known, initial=top))
     corners = np.array([[-1.2 * top, 1.3 * top + 0.03], [1.03 * right, lowest]])
     draw_scene(ax, found.recording.machine, around(corners))
-    # All of it has left the belt below the place where the first of it does.
+    # Below the place where the first part leaves, the whole stream has left the belt.
     first = min(
         (path.at([0.0])[0, 1] for one in found.methods.values() for path in one.paths), default=top
     )
@@ -452,7 +452,7 @@ LEFT, RIGHT = 0.9, 2.1
 """Room left of the panel, and right of it for the legend, inches."""
 
 CHARACTERS = 105
-"""Characters of small text that go into a line."""
+"""Characters of small text that fit into a line."""
 
 LOOKS: dict[str, dict[str, Any]] = {
     "fixed": {"color": ORANGE, "marker": "s", "markersize": 9.0},
@@ -460,8 +460,8 @@ LOOKS: dict[str, dict[str, Any]] = {
     "contact": {"color": SKY, "marker": "P", "markersize": 8.0},
     "exact": {"color": BLUE, "marker": "*", "markersize": 15.0},
 }
-"""Colour and marker of each method: readers need not tell the colours apart. In the order of
-drawing: of two at one place, the upper is the smaller."""
+"""Colour and marker of each method, so that colour is not needed. In the order of drawing: of two
+at one place, the upper is the smaller."""
 
 TITLES = {"pymunk": "pymunk, aligned", "fixed": "pymunk, fixed step"}
 
@@ -517,7 +517,7 @@ def decades(
         room = max(0.08 * (high - low), 0.3)
         low, high = low - room, high + room
     first, last = ceil(low), floor(high)
-    if last <= first:  # one power of ten alone tells nothing of the scale
+    if last <= first:  # a single power of ten does not show the scale
         low = first = floor(low)
         last = first + 1
         high = max(high, last)
@@ -533,7 +533,7 @@ def decades(
 
 
 def failures(timings: Sequence[Timing], width: int) -> list[str]:
-    """Name what failed, in lines of at most `width` characters: with which steps, and why."""
+    """List failures in lines of at most `width` characters: steps and reasons."""
     lines = []
     for method in METHODS:
         failed = [one for one in timings if one.method == method and one.failed]

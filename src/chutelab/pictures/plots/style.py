@@ -1,8 +1,8 @@
-"""How pictures look: colours and language for a while, text sizes, units, and figures.
+"""Look of pictures: colours and language within a block, text sizes, units, and figures.
 
-`look` chooses the colours, light or dark, and the language. What draws asks for the colours by
-name, such as ``style.TRACK``, and `say` for its words, and is given those of the look that holds.
-`Picture` is a figure with a headline, which writes itself to a file and shows itself in a notebook.
+`look` chooses the colours, light or dark, and the language. Drawing functions use colours by name,
+such as ``style.TRACK``, and `say` for words, and get those of the present look. `Picture` is a
+figure with a headline that can be written to a file and shown in a notebook.
 """
 
 from __future__ import annotations
@@ -57,10 +57,9 @@ _WORDS: ContextVar[Words] = ContextVar("words")
 
 
 def colours() -> dict[str, Any]:
-    """Return the colours of the look that holds by name, and what is made of them.
+    """Return the colours of the present look by name, and styles made from them.
 
-    Each stands for one thing in every panel. The ledger has the same hues in the light and in the
-    dark.
+    Each has one meaning in every panel. The ledger has the same hues in both looks.
     """
     base = {name: pair[_DARK.get()] for name, pair in LOOKS.items()}
     ink, track, strike, analytic = (base[name] for name in ("INK", "TRACK", "STRIKE", "ANALYTIC"))
@@ -78,14 +77,14 @@ def colours() -> dict[str, Any]:
             "damper_loss": "#8A7A00",
             "residual": ink,
         },
-        # How lines known analytically are drawn, under those that are simulated; strobe dots.
+        # Styles of analytic lines, drawn under simulated ones; strobe dots.
         "DASHED": {"color": analytic, "lw": 4.0, "ls": (0, (2.2, 1.1))},
         "RINGS": {"ls": "none", "marker": "o", "mfc": base["GROUND"], "mec": track},
     }
 
 
 def __getattr__(name: str) -> Any:
-    """Return one of the colours above, of the look that holds, see `colours`."""
+    """Return one of the colours above, of the present look, see `colours`."""
     try:
         return colours()[name]
     except KeyError:
@@ -93,28 +92,28 @@ def __getattr__(name: str) -> Any:
 
 
 def say(key: str, /, **values: object) -> str:
-    """Return what pictures say in the language that holds: a template, ``picture-KEY``."""
+    """Return the text ``picture-KEY`` in the present language, filled in."""
     return spoken().say(f"picture-{key}", **values)
 
 
 def spoken() -> Words:
-    """Return the words of the language that holds."""
+    """Return the words of the present language."""
     return _WORDS.get(words())
 
 
 def figures(value: float, form: str = ".3g") -> str:
-    """Return a number in the digits of the language that holds."""
+    """Return a number as written in the present language."""
     return spoken().figures(value, form)
 
 
 def named(text: str) -> str:
-    """Return how a surface or a stream is called; most names are the same in every language."""
+    """Return the name of a surface or stream; most are the same in every language."""
     return spoken().catalogue.get(f"picture-name-{text}", text)
 
 
 @contextmanager
 def look(*, dark: bool = False, language: str = "en") -> Iterator[None]:
-    """Draw in the light or the dark colours, and in a language, until the end of the block.
+    """Use the light or the dark colours, and a language, until the end of the block.
 
     Titles of shipped scenes are in that language, too; names that a scene gives stay as they are.
 
@@ -142,7 +141,7 @@ def look(*, dark: bool = False, language: str = "en") -> Iterator[None]:
 
 
 SMALL, NORMAL, LARGE = 9.5, 10.5, 13.0
-"""Text sizes, pt; nothing is smaller, so that a projected picture stays readable."""
+"""Text sizes, pt; none is smaller, so that a projected picture stays readable."""
 
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 
@@ -192,7 +191,7 @@ def tint(colour: str, share: float, ground: str | None = None) -> str:
 def drawable(text: str) -> str:
     """Return a text with another sign for each character that the font lacks.
 
-    So matplotlib, which draws the text in bold or not, need not warn of any.
+    So matplotlib does not warn about missing characters, in bold or not.
     """
     fonts = [
         [get_font(findfont(FontProperties(family=[name], weight=weight))) for name in families]
@@ -209,7 +208,7 @@ def drawable(text: str) -> str:
 
 
 def plain(text: str) -> str:
-    r"""Return a text such that matplotlib writes it as it is, and takes no ``$`` for mathematics.
+    r"""Return a text that matplotlib writes literally, without mathematics in ``$``.
 
     Use it for all text from users: titles, names, keys.
 
@@ -220,14 +219,14 @@ def plain(text: str) -> str:
 
 
 class Digits(ScalarFormatter):
-    """Numbers beside ticks in the digits of the language that held as the axes were dressed."""
+    """Numbers at ticks, written in the language in which the axes were made."""
 
     def __init__(self) -> None:
         super().__init__()
         self._words = spoken()
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """Return what stands beside a tick."""
+        """Return the label of a tick."""
         return self._words.local(super().__call__(x, pos))
 
 
@@ -255,7 +254,7 @@ def note(ax: Axes, text: str) -> None:
 
 
 def colour_bar(ax: Axes, drawn: ScalarMappable, label: str) -> None:
-    """Add beside axes what the colours of something drawn on them mean."""
+    """Add a colour bar beside axes."""
     bar = ax.figure.canvas.figure.colorbar(drawn, ax=ax, format=Digits(), fraction=0.035, pad=0.02)
     bar.set_label(label, fontsize=NORMAL)
     bar.ax.tick_params(labelsize=SMALL)
@@ -264,7 +263,7 @@ def colour_bar(ax: Axes, drawn: ScalarMappable, label: str) -> None:
 def legend_above(ax: Axes, columns: int, handles: list[Any] | None = None) -> None:
     """Add a legend right above axes, by default of all that has a label.
 
-    It is one line if that fits, else as many `columns`, or fewer, as are no wider than the axes.
+    It is one line if that fits, else it has up to `columns` columns that fit the width of the axes.
     """
     options: dict[str, Any] = {
         "handles": handles,
@@ -284,7 +283,7 @@ def legend_above(ax: Axes, columns: int, handles: list[Any] | None = None) -> No
 def stream_colours(count: int) -> list[str]:
     """Return a colour for each stream; the sixth to the tenth are nearer to the ink.
 
-    Orange, that of what is known analytically, comes as late as may be.
+    Orange, the colour of analytic curves, comes as late as possible.
     """
     hues = (colours()["STREAM"], PURPLE, ORANGE, BLUE, GREEN)
     every = [*hues, *(tint(hue, 0.6, colours()["INK"]) for hue in hues)]
@@ -292,11 +291,11 @@ def stream_colours(count: int) -> list[str]:
 
 
 LONGEST = 20
-"""Characters of a stream's name in a legend."""
+"""Most characters of a stream's name in a legend."""
 
 
 def stream_handles(machine: Machine) -> list[Line2D]:
-    """Return what a legend needs to name the streams, unless it is particle 0 alone."""
+    """Return handles for a legend of the streams, unless there is only particle 0."""
     hues = stream_colours(len(machine.streams))
     sizes = np.bincount(machine.releases.stream, minlength=len(hues))
     return [
@@ -307,7 +306,7 @@ def stream_handles(machine: Machine) -> list[Line2D]:
 
 
 def scientific(value: float, unit: str) -> str:
-    """Return a value that is read for its power of ten.
+    """Return a value in scientific notation, with its unit.
 
     >>> scientific(-1.4e-17, "J"), scientific(0.0, "J")
     ('−1e−17 J', '0 J')
@@ -316,7 +315,7 @@ def scientific(value: float, unit: str) -> str:
 
 
 UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-"""By format, what keeps the time at which a picture is written out of its file."""
+"""By format, metadata that keep the time of writing out of a file."""
 
 
 class Picture(Figure):

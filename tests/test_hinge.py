@@ -515,3 +515,26 @@ def test_a_hinge_that_is_not_that_of_the_scene_breaks_a_law(change, law):
     wrong = replace(recording, machine=replace(other, movers=tuple(hinges)))
     assert law in {broken.law for broken in judge(wrong)}
     assert {broken.surface for broken in judge(wrong)} == {"lever"}
+
+
+def test_what_goes_over_between_two_boards_at_their_stops_is_told_where_it_is():
+    """Where two stops are met in a row a step has no length: all numbers of events are finite."""
+    at_stops = {"restitution": 0.0, "friction": 50.0}
+    recording = chutelab.simulate({
+        "particle": {"radius": 0.006, "spin": True, "mass": 0.198},
+        "surface": [
+            {"name": "heavy", "from": [-0.014, 0.554], "to": [0.031, 0.406], "mass": 4.258,
+             "hinge": [0.009, 0.48], "stops_deg": [-47.343, 55.691], "spring": 0.774,
+             "rest_deg": -11.091, **at_stops},
+            {"name": "light", "from": [-0.028, 0.404], "to": [0.009, 0.591], "mass": 0.061,
+             "hinge": [-0.028, 0.404], "stops_deg": [-29.288, 51.315], "spring": 5.413,
+             "rest_deg": -32.702, "motor": {"speed_deg": 195.881, "torque": 0.062}, **at_stops,
+             "restitution": 0.496},
+        ],
+        "stream": {"count": 30, "at": [-0.05, 0.75], "to": [0.05, 0.75], "velocity": [0.0, -0.922],
+                   "rate": 100.0, "interact": True, "restitution": 0.0, "friction": 5.0,
+                   "seed": 3},
+        "run": {"until": 0.35, "engine": "contact"},
+    })  # fmt: skip
+    assert np.isfinite(recording.events["position"]).all()
+    assert not recording.laws

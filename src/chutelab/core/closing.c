@@ -41,7 +41,8 @@ static void tell_passage(const Contact *c, int kind) {
     const double *last = track->held, *past = track->past;
     double way[2], t = d->t - since_passage(c, way), on = t - last[0];
     double then[5] = {d->x, d->y, d->ux, d->uy, d->uspin};
-    for (int n = 0; n < 3 && track->lasted > 1; n++) {
+    /* Where a stop of a hinge ends a step as it begins, they are one. */
+    for (int n = 0; n < 3 && track->lasted > 1 && last[0] > past[0]; n++) {
         then[2 + n] = last[3 + n] + on / (last[0] - past[0]) * (last[3 + n] - past[3 + n]);
         if (n < 2) then[n] = last[1 + n] + 0.5 * on * (last[3 + n] + then[2 + n]);
     }
@@ -67,12 +68,14 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     double past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0, span = past + 0.5 * h;
     int grips = fabs(c->impulse[1]) < most * (1 - 1e-12) || (most == 0 && slip == 0 && c->drift == 0);
     Track *track = W.tracks + i;
-    for (int n = 2; n > 0; n--) {
-        track->load[n] = track->load[n - 1];
-        track->load_t[n] = track->load_t[n - 1];
+    if (span > 0) {
+        for (int n = 2; n > 0; n--) {
+            track->load[n] = track->load[n - 1];
+            track->load_t[n] = track->load_t[n - 1];
+        }
+        track->load[0] = c->impulse[0] / span;
+        track->load_t[0] = d->t;
     }
-    track->load[0] = c->impulse[0] / span;
-    track->load_t[0] = d->t;
     if (d->on < 0) {
         /* It came to lie there without an impact that was recorded. */
         tell_arrival(c, IMPACT, past, h);

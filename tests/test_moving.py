@@ -11,8 +11,10 @@ import pytest
 
 import chutelab
 from chutelab.engines.simulation import judged
+from chutelab.machine import build
 from chutelab.results.laws import INSIDE, judge
-from chutelab.scene import SceneError
+from chutelab.scene import SceneError, from_dict
+from cores import Core
 from machines import in_a_box
 from shared import seeds
 
@@ -479,6 +481,29 @@ def test_a_wheel_with_paddles_lifts_balls_and_pays_for_it():
     # A grip that takes hold in a step was told as long after it as its friction would have taken.
     events = recording.events
     assert (events["t"] <= last["t"][events["particle"]]).all()
+
+
+def test_a_lifter_that_has_no_room_for_a_crowd_presses_it_without_end_of_impacts():
+    """What a wall and a drive hold cannot part: no step of it takes thousands of sweeps."""
+    lifts = {"pivot": [0.0, 0.0], "turn": -20.0, "restitution": 0.0}
+    core = Core(build(from_dict({
+        "particle": {"radius": 0.0053},
+        "surface": [
+            {"name": "drum", "center": [0.0, 0.0], "radius": 0.066, "friction": 0.33,
+             "restitution": 0.6},
+            {"name": "long", "from": [0.066, 0.0], "to": [0.022, 0.0], "friction": 5.0, **lifts},
+            {"name": "short", "from": [-0.066, 0.0], "to": [-0.051, 0.0], **lifts},
+        ],
+        "stream": {"fill": [[-0.04, -0.04], [0.04, 0.04]], "count": 50, "interact": True,
+                   "restitution": 0.0, "friction": 0.4},
+        "run": {"until": 1.0},
+    })))  # fmt: skip
+    before, ended = 0, False
+    while not ended:
+        ended = core.step()
+        assert core.world.sweep_count < before + 5000
+        before = core.world.sweep_count
+    assert not judge(core.recording())
 
 
 @pytest.mark.slow

@@ -183,19 +183,20 @@ static void settle_down(Disk *d, double h) {
     d->anchor[2] = 0;
 }
 
-/* Set the approach at which disks in contact with a rider, directly or through others, may stay unresolved. The solver
-   does not move riders, so between two of them, or one and a belt, there may be no room, and impacts would go on without
-   end. Impacts may leave open as much as the solve of all of these contacts does: see `left_over`. */
+/* Set the approach at which disks in contact with a rider or a surface that moves, directly or through others, may stay
+   unresolved. The solver moves neither, so between two of them, or one and a wall, there may be no room, and impacts would
+   go on without end. Impacts may leave open as much as the solve of all of these contacts does: see `left_over`. */
 void give_in(const Contact *list, int count) {
     double open = 0, u[3], v[3];
-    int carried = 0;
-    for (int n = 0; n < count; n++) carried |= list[n].j >= 0 && W.disks[list[n].j].mode == RIDING;
-    for (int n = 0; n < count && carried; n++) {
+    int led = 0;
+    for (int n = 0; n < count; n++)
+        led |= list[n].j >= 0 ? W.disks[list[n].j].mode == RIDING : stirs(W.surfaces + (-1 - list[n].j));
+    for (int n = 0; n < count && led; n++) {
         relative(list + n, 1, u);
         relative(list + n, 0, v);
         open = MAX(open, u[0] + asks(list + n, list[n].impulse[0]) - v[0]);
     }
-    for (int n = 0; n < count && carried; n++) {
+    for (int n = 0; n < count && led; n++) {
         W.disks[list[n].i].open = open;
         if (list[n].j >= 0) W.disks[list[n].j].open = open;
     }

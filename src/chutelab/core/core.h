@@ -408,8 +408,8 @@ double slip_of(const SolverRow *row);
 double sweep_fours(int rows, int all_bodies, int cornered, int sweeps, int plain, double accurate, double most);
 
 /* solver.c */
-void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
-                    double enough);
+int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
+                   double enough);
 void solve_contacts(int again);
 
 /* closing.c */

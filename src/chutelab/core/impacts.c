@@ -434,7 +434,7 @@ static void jam(Contact *struck, double t) {
     W.swings_too = 0;
     for (int n = 0; n < count; n++) W.swings_too |= list[n].hung > 0;
     /* Not hastened at first: then what rattles may never be as calm as it must be. */
-    sweep_contacts(list, count, 0, JAM_SWEEPS, W.sweeps, 0.1 * left, left);
+    int ended = sweep_contacts(list, count, 0, JAM_SWEEPS, W.sweeps, 0.1 * left, left);
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
         Disk *d = W.disks + m;
         double v[3] = {d->vx, d->vy, d->spin};
@@ -444,6 +444,9 @@ static void jam(Contact *struck, double t) {
         was_moved(m);
         memcpy(&d->vx, v, sizeof v);
     }
+    /* More jams do not help where sweeps have no end: to count them as many impacts leaves more open after few. */
+    for (int m = i; m >= 0 && !ended; m = W.disks[m].jam_next)
+        W.disks[m].impacts += W.disks[m].impacts < STUCK ? CROWDED : FEW / 2;
     account(list, count);
     give_in(list, count);
     for (int n = 0; n < count; n++) {

@@ -83,11 +83,11 @@ static void ease_friction(Contact *list, int count, double least, double by) {
    belt with practically unbounded friction.
 
    The impulses of the step before are taken as far as they lower the cost, see `lessen`: where a contact has opened, those of
-   its neighbours would throw disks out. */
-void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
-                    double enough) {
+   its neighbours would throw disks out. Return whether the sweeps ended by themselves. */
+int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
+                   double enough) {
     double first = INFINITY;
-    int driven = 0, pressing = 0, lessened = 0, light = W.interact, fine = accurate < W.accurate;
+    int driven = 0, pressing = 0, lessened = 0, ended, light = W.interact, fine = accurate < W.accurate;
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         driven |= drives(c);
@@ -102,7 +102,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
         if (change == INFINITY) change = sweep_rows(sweeps, plain, accurate);
         light = 0;
         worst = change;
-        int ended = change <= accurate;
+        ended = change <= accurate;
         if (!ended) keep_bounds();
         if (!ended || W.interact) lessened = lessen();
         if (left == 0) break;
@@ -130,6 +130,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
     }
     if ((drop_noise() || lessened) && W.interact) lessen();
     take_rows(list, count);
+    return ended;
 }
 
 /* By how much the impulses of a step change the gap at its end, m, other than along the straight path: the surface bends, and

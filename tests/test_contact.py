@@ -222,11 +222,11 @@ def test_crowds_obey_the_laws(seed, count):
     assert not faults(recording)
 
 
-def feeder(count=60):
+def feeder(count=60, gates=()):
     """Three hundred times as many as can pass, released in one place above a tray."""
     return scene_of(
         surface=[{"name": "tray", "points": [[-0.1, 0.3], [-0.1, 0.0], [0.1, 0.0], [0.1, 0.3]],
-                  "restitution": 0.3, "friction": 0.5}],
+                  "restitution": 0.3, "friction": 0.5}, *gates],
         stream={"count": count, "rate": 1e4, "at": [-0.05, 0.5], "velocity": [0.4, -0.5],
                 "interact": True, "restitution": 0.3},
         run={"until": 3.0},
@@ -291,6 +291,17 @@ def test_run_in_slices_or_in_rooms_that_have_to_grow_it_is_the_same():
         while not core.step(slices):
             pass
         assert same(core.recording(), whole)
+
+
+@pytest.mark.parametrize(("name", "near"), [("gates", 1), ("gates", 3), ("flap-gate", 1)])
+def test_a_step_that_has_to_make_room_is_the_same(name, near):
+    """Also where steps differ in length, by gates that open, and where bounds on hinges matter."""
+    times = np.random.default_rng(1).uniform(0.02, 0.9, 200)
+    gates = [{"name": f"gate {n}", "from": [3.0 + n, 0.0], "to": [3.5 + n, 0.0], "opens_at": t}
+             for n, t in enumerate(times.tolist())]  # fmt: skip
+    loaded = {"gates": lambda: feeder(30, gates), "flap-gate": lambda: build(scene.load(name))}
+    machine = loaded[name]()
+    assert same(Core(machine, {"near": near}).run(), Core(machine).run())
 
 
 # The scene `stream`

@@ -417,7 +417,7 @@ static void note_totals(void) {
 }
 
 /* Begin a step: paths of riders and sleepers, pairs that may meet, lasting contacts and their solve. If an array is too
-   small, return a `Full` status; the step can then be begun again. */
+   small, return a `Full` status before anything has changed; the step can then be begun again. */
 static int begin_step(void) {
     int woke;
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
@@ -478,7 +478,12 @@ static int begin_step(void) {
         if (W.joint_count) pull_joints(h);
         int near = list_near(W.step_end), room = near && find_contacts(h, &woke);
         if (!room || woke) drop_tugs();
-        if (!room) return near ? FULL_CONTACTS : FULL_NEAR;
+        if (!room) {
+            /* Repeat this part only: before it, the length of the last step and bounds on hinges have been replaced. */
+            if (!make_room(near ? FULL_CONTACTS : FULL_NEAR)) return LACKING;
+            woke = 1;
+            continue;
+        }
         if (stride > W.step && W.contact_count) {
             /* It is not in flight: its contacts are solved for a step of the usual length. */
             stride = 0;

@@ -1,4 +1,4 @@
-// A page without steps: what it makes of a scene.
+// A page without steps: the sandbox of a scene.
 
 import { Callout } from "./callout.ts";
 import { Menu } from "./menu.ts";
@@ -10,7 +10,7 @@ import { Phone } from "./phone.ts";
 import { Prediction } from "./predict.ts";
 import { Tools } from "./tools.ts";
 
-/** A button for the page's other language, in which it opens as it is. */
+/** A button for the page's other language; the page opens there in its present state. */
 function language({ other }: any) {
   if (!other || !/^(https?|file):$/.test(location.protocol)) return;
   const name = LANGUAGES[other.language], asked = other.language;
@@ -39,7 +39,7 @@ start(({ lab, stage, words, bench, inspector, symbols }) => {
     if (said && heading.textContent !== said) document.title = heading.textContent = said;
   };
   lab.on("scene", head);
-  // The address may have told another scene already.
+  // The address may already have given another scene.
   head();
   return { palette, sensors, tools };
 });

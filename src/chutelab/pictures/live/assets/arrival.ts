@@ -1,9 +1,9 @@
-// Which particles have come to the outgoing belt, when, where and how fast: what Python's
-// `results/arrival.py` says, by the same operations in the same order.
+// Arrivals of particles on the outgoing belt: when, where and how fast; the same operations in the
+// same order as Python's `results/arrival.py`.
 //
-// A particle arrives when it first touches the belt, or touches what lies on it: what touches the
-// belt, what touches that, and so on. What has bounced off lies on nothing. Where particles do not
-// meet each other, to arrive is to touch the belt itself.
+// A particle arrives when it first touches the belt, or touches what lies on it: particles that
+// touch the belt, those that touch these, and so on. A particle that has bounced off does not lie
+// on the belt. If particles do not meet each other, to arrive is to touch the belt itself.
 
 import { modulo } from "./trig.ts";
 import type { Event } from "./core.ts";
@@ -20,21 +20,21 @@ const COLLISION = 5;
 /** Gap, as a share of the smaller radius, up to which two touch. */
 const TOUCH = 0.01;
 
-/** Instants at which is looked what lies on the belt without a blow that was recorded. */
+/** Times at which particles that lie on the belt without a recorded impact are searched. */
 const RESTS = 100;
 
-/** Of the time between two such instants, until the one is known at which a contact began. */
+/** Share of the time between two such times to which the beginning of a contact is found. */
 const BISECTIONS = 24;
 
 class Arrivals {
   flat;
   bent;
-  /** Of each particle; none of those that have not arrived. */
+  /** By particle; missing for those that have not arrived. */
   found: (Arrival | undefined)[];
-  /** Contacts that are not judged yet, and how many events have been read. */
+  /** Contacts that have not been judged, and the number of events read. */
   due: Event[] = [];
   seen = 0;
-  /** s up to which it is known what has arrived. */
+  /** Arrivals are known up to this time, s. */
   since = NaN;
 
   /** @param recording as far as it has come */
@@ -50,16 +50,16 @@ class Arrivals {
     }
   }
 
-  /** Whether something is of the outgoing belt; there may be none. */
+  /** Whether something belongs to the outgoing belt; there may be none. */
   own = ({ surface }: { surface: number }) =>
     surface >= 0 && surface === this.recording.machine.landing;
 
-  /** s up to which all is recorded. */
+  /** Everything is recorded up to this time, s. */
   get reach() {
     return this.recording.state === "running" ? this.recording.now : this.recording.end;
   }
 
-  /** Take in what a run that goes on has added. */
+  /** Take in what a running run has added. */
   update() {
     this.read();
     if (this.reach > this.since) this.look(this.reach);
@@ -75,20 +75,20 @@ class Arrivals {
     const { events, machine } = this.recording;
     const more = events.slice(this.seen);
     this.seen = events.length;
-    // All that happens on it: what passes on to it from a tangential chute gives no blow.
+    // All events on it count: a particle that slides onto it from a tangential chute has no impact.
     const direct = more.filter(this.own);
     if (!machine.interact) {
       for (const event of direct) this.found[event.disk] ??= arrivalOf(event);
       return;
     }
     if (isNaN(this.since)) {
-      // Nothing comes before the first that touches the belt itself, which is told however soft.
+      // Nothing arrives before the first touch of the belt itself, which is always recorded.
       const begin = direct.reduce((least, { t }) => Math.min(least, t), Infinity);
       if (isFinite(begin)) this.since = begin;
     }
     this.due = [...this.due, ...direct, ...more.filter(({ kind }) => kind === COLLISION)]
       .filter(({ t }) => t >= this.since);
-    // Of one instant, what touches the belt comes first.
+    // At one time, particles that touch the belt come first.
     const late = ({ kind }: Event) => Number(kind === COLLISION);
     this.due.sort((a, b) => a.t - b.t || late(a) - late(b) || a.disk - b.disk);
   }
@@ -102,7 +102,7 @@ class Arrivals {
       if (j < 0) found[i] ??= arrivalOf(event);
       else if (!found[i] !== !found[j]) {
         const [next, old] = found[i] ? [j, i] : [i, j];
-        // Whatever lies there has come before.
+        // Particles that lie there have arrived before.
         const there = this.places(event.t).filter((one) => found[one.i]);
         if (this.carries(old, event.t, there)) {
           found[next] = next === i ? arrivalOf(event) : this.state(next, event.t);
@@ -110,7 +110,7 @@ class Arrivals {
       }
     }
     this.due.splice(0, n);
-    // What came to lie there so softly that no blow was recorded.
+    // Particles that came to lie there so softly that no impact was recorded.
     const places = this.places(t), lies = this.lying(t, places);
     places.forEach(({ i }, k) => {
       if (lies[k] && !found[i]) found[i] = this.began(i, this.since, t);
@@ -118,7 +118,7 @@ class Arrivals {
     this.since = t;
   }
 
-  /** Where all are that are under way. @param t s */
+  /** Places of all particles under way. @param t s */
   places(t: number): Place[] {
     const places: Place[] = [];
     this.recording.tracks.forEach((track, i) => {
@@ -143,7 +143,7 @@ class Arrivals {
     return Math.hypot(a.x - b.x, a.y - b.y) <= r + s + TOUCH * Math.min(r, s);
   }
 
-  /** Which of some lie on the belt, or on what lies on it. @param t s */
+  /** The particles, of some, that lie on the belt, or on what lies on it. @param t s */
   lying(t: number, places: Place[]): boolean[] {
     const { radius } = this.recording.machine;
     const lies = places.map((place) => this.touches(place, t));
@@ -166,7 +166,7 @@ class Arrivals {
     return lies;
   }
 
-  /** Whether a particle, one of some, lies on the belt, or on what of them lies on it.
+  /** Whether a particle, one of some, lies on the belt, or on those of them that do.
    * @param t s */
   carries(i: number, t: number, places: Place[]) {
     const seen = new Set([i]), todo = places.filter((place) => place.i === i);
@@ -181,8 +181,9 @@ class Arrivals {
     return false;
   }
 
-  /** How a particle that lies there at one time, but not at an earlier one, came there.
-   * @param before s @param after s */
+  /** The arrival of a particle that lies there at one time, but not at an earlier one.
+   * @param before s
+   * @param after s */
   began(i: number, before: number, after: number) {
     for (let n = 0; n < BISECTIONS; n += 1) {
       const middle = 0.5 * (before + after);

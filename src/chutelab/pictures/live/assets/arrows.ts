@@ -1,4 +1,4 @@
-// Velocities, forces and impulses as arrows on the particles, with bars that tell their scale.
+// Velocities, forces and impulses as arrows on the particles, with bars for their scale.
 
 import { roundUp } from "./chart.ts";
 import { ARROW } from "./handles.ts";
@@ -11,19 +11,20 @@ import type { Words } from "./words.ts";
 /** From x, y to x, y, px */
 type Arrow = [number, number, number, number];
 
-/** px of the largest weight, and of the largest impulse. */
+/** Length of the largest weight, and of the largest impulse, px. */
 const WEIGHT = 38, IMPULSE = 64;
 
-/** The arrow of an impulse stays for so many s of simulated time. */
+/** An arrow of an impulse is shown for so many s of simulated time. */
 const STAYS = 0.15;
 
 /** Shorter arrows are points, px. */
 const SHORTEST = 1.5;
 
-/** Force other than gravity, N: what the curve of the track says by Newton's second law. The curve
+/** Force other than gravity, N, from the curvature of the track by Newton's second law. The curve
  * between two knots is cubic, so that its acceleration at the share s of the time h between them is
  * (6 Δ/h (1 - 2 s) + va (6 s - 4) + vb (6 s - 2)) / h.
- * @param mass kg @param gravity m/s²; along -up */
+ * @param mass kg
+ * @param gravity m/s²; along -up */
 function contactForce(
   track: Track, t: number, mass: number, { gravity, up }: Machine,
 ): [number, number] {
@@ -68,7 +69,7 @@ class Arrows {
       const fall = perNewton * its;
       gravities.push([x, y, x - fall * machine.up[0], y + fall * machine.up[1]]);
       const [fx, fy] = contactForce(track, t, machine.mass[i], machine);
-      // What is left over in flight is rounding.
+      // The remainder in flight is rounding.
       if (Math.hypot(fx, fy) > 1e-6 * its) {
         contacts.push([x, y, x + perNewton * fx, y - perNewton * fy]);
       }

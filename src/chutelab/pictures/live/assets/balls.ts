@@ -1,4 +1,4 @@
-// Particles: shaded balls in the colour of their material, or flat discs by kind or by speed.
+// Particles: shaded balls in the colour of their material, or flat discs coloured by kind or speed.
 
 import type { Lab } from "./lab.ts";
 import type { Recording } from "./recording.ts";
@@ -6,7 +6,7 @@ import type { Point } from "./scene.ts";
 
 export type Hue = "material" | "kind" | "speed" | "size";
 
-/** Light, middle and dark of a ball, by material; without one it has its stream's colour. */
+/** Light, middle and dark colour of a ball, by material; without one it has its stream's colour. */
 const SHADES: Record<string, [string, string, string]> = {
   steel: ["#ffffff", "#c3ccd3", "#59656f"],
   rubber: ["#f3a08a", "#c4432a", "#6d1f10"],
@@ -22,7 +22,7 @@ const SHADES: Record<string, [string, string, string]> = {
   ice: ["#ffffff", "#cfeaf6", "#6fa9c6"],
 };
 
-/** The same for streams without a material, which are of the colours of `--kind-N`. */
+/** The same for streams without a material, with the colours of `--kind-N`. */
 const STREAMS: [string, string, string][] = [
   ["#ffb595", "#d4582f", "#7b2a10"], ["#ffe09a", "#e69f00", "#8a5c00"],
   ["#c8e8fb", "#56b4e9", "#1f6c9c"], ["#f0d0e2", "#cc79a7", "#7d3d61"],
@@ -32,8 +32,9 @@ const STREAMS: [string, string, string][] = [
 /** Steps of colour of a speed or a size. */
 const STEPS = 8;
 
-/** To tell the speeds of a run: particles and times that are looked at, the share of speeds that
- * the colours reach to, and by how much longer a run has to be to be looked at again. */
+/** For the range of speeds of a run: particles and times that are sampled, the quantile of speeds
+ * at the end of the colours, and the factor by which a run must become longer to be sampled again.
+ */
 const SOME = 100, TIMES = 24, MOST = 0.98, LONGER = 1.2;
 
 /** Pixels of radius below which a ball is a flat disc. */
@@ -46,17 +47,17 @@ const LARGEST = 48, KEPT = 200;
 class Balls {
   hue: Hue = "material";
   pictures: Map<string, HTMLCanvasElement> = new Map();
-  /** Where the first colour begins and the last one ends, and the unit of that: m/s, or mm of
-   * radius. */
+  /** Beginning of the first colour and end of the last one, and their unit: m/s, or mm of radius.
+   */
   range: [number, number] = [0, 1];
   unit = "m/s";
 
   constructor(readonly lab: Lab, readonly colour: (name: string) => string) {}
 
-  /** Whether a material has shades of its own. */
+  /** Whether a material has its own shades. */
   isShaded = (material: string) => material in SHADES;
 
-  /** What names a particle's shades: its material, or the number of its stream. */
+  /** Name of a particle's shades: its material, or the number of its stream. */
   kindOf(i: number): string {
     const { scene, machine } = this.lab, release = machine?.releases[i];
     const material = this.hue === "kind" ? "" : scene?.particles[release?.kind ?? 0]?.material ?? "";
@@ -75,7 +76,7 @@ class Balls {
     return Math.max(0, Math.min(STEPS - 1, Math.floor((STEPS * (value - low)) / (high - low))));
   }
 
-  /** Paint one at a place, px. @param speed m/s */
+  /** Paint a particle at a place, px. @param speed m/s */
   paint(
     context: CanvasRenderingContext2D, i: number, x: number, y: number, r: number, speed: number,
   ) {
@@ -97,7 +98,7 @@ class Balls {
     context.drawImage(picture, x - wide, y - wide, 2 * wide, 2 * wide);
   }
 
-  /** Paint a box or polygon by its corners, px; the light comes from where it comes on balls. */
+  /** Paint a box or polygon by its corners, px, with the same direction of light as balls. */
   paintCorners(
     context: CanvasRenderingContext2D, i: number, corners: Point[], r: number, speed: number,
   ) {
@@ -123,7 +124,7 @@ class Balls {
     context.stroke();
   }
 
-  /** A shaded ball, made once for each radius, px: to draw a large one small takes long. */
+  /** A shaded ball, made once for each radius, px, as drawing a large one small takes long. */
   picture(kind: string, size = LARGEST) {
     const name = `${kind} ${size}`, known = this.pictures.get(name);
     if (known) return known;
@@ -145,11 +146,11 @@ class Balls {
     return canvas;
   }
 
-  /** Of which run speeds were looked at, and from when on they are again, s. */
+  /** The run whose speeds were sampled, and the time of the next sample, s. */
   known = { recording: null as Recording | null, now: 0, again: 0 };
 
-  /** Have the colours reach to a round speed that few particles exceed for a short time, or from
-   * the smallest particle to the largest. */
+  /** Set the range of the colours: up to a round speed that few particles exceed, and only for a
+   * short time, or from the smallest particle to the largest. */
   measure() {
     const { recording, machine } = this.lab;
     if (this.hue === "size" && machine) {

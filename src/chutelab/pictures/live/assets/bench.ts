@@ -1,4 +1,4 @@
-// What is done on the picture itself: look around, choose, move, draw, copy and delete.
+// Editing in the picture: look around, choose, move, draw, copy and delete.
 
 import { mayDraw } from "./controls.ts";
 import { isJoint } from "./checks.ts";
@@ -22,41 +22,42 @@ import type { Words } from "./words.ts";
 
 type Place = [number, number];
 
-/** Pixels that a finger or a mouse may stray while it clicks. */
+/** Pixels that a finger or mouse may move during a click. */
 const STRAY = 6;
 
-/** ms after which a finger holds what it is on. */
+/** A finger that stays for so many ms holds the part under it. */
 const HOLD = 450;
 
 const distance = ([x, y]: Place, [u, v]: Place) => Math.hypot(u - x, v - y);
 
-/** How far from a line, from a ball, or from a pin it can be clicked, pixels. */
+/** Largest distance of a click from a line, a ball, or a pin, pixels. */
 const CLICK_REACH = 14, BALL_REACH = 22, PIN_REACH = 7;
 
-/** Balls that can be clicked while they move; more are a crowd. */
+/** Most balls that can be clicked while they move; more are a crowd. */
 const MOST_BALLS = 100;
 
 const ZOOM = 1.25;
 
-/** Share of the machine that is in sight, or everything can be shown. */
+/** If a smaller share of the machine is in sight, a button offers to show everything. */
 const IN_SIGHT = 0.25;
 
-/** Shares of the picture from its middle where there may be room for a part; px that are enough. */
+/** Shares of the picture, from its middle, at which room for a part is searched; and a sufficient
+ * distance, px. */
 const GRID = [-0.36, -0.24, -0.12, 0, 0.12, 0.24, 0.36], ROOM = 160;
 
-/** Places that are tried where a part cannot be at the best one. */
+/** Most places that are tried for a part. */
 const TRIES = 12;
 
 /** Pixels per metre. */
 const SCALES = [2, 2e5];
 
-/** Pixels that a key moves the view, or what is drawn with; with Shift a tenth. */
+/** Pixels by which a key moves the view, or the point that is drawn; with Shift a tenth. */
 const KEY = 20;
 
-/** Pixels that a copy lies beside what it is a copy of. */
+/** Distance of a copy from the original, pixels. */
 const ASIDE = [28, 28];
 
-/** Where a part has its points if no pointer sets them, in sizes of things that are new. */
+/** Points of a part if no pointer sets them, in sizes of new parts. */
 const EXAMPLES: Record<string, Place[]> = {
   from: [[-0.2, 0], [0.2, 0]], points: [[-0.2, 0.06], [0.2, -0.06], [0, -0.15]],
   arc: [[-0.2, 0], [0.2, 0], [0, -0.12]], at: [[-0.05, 0], [0.1, 0]], center: [[-0.25, 0.1]],
@@ -64,22 +65,22 @@ const EXAMPLES: Record<string, Place[]> = {
 };
 
 class Bench {
-  /** The part that is drawn; null while things are chosen and moved. */
+  /** The part being drawn; null while parts are chosen and moved. */
   mode: Part | null = null;
-  /** The points that are set of what is being drawn, m. */
+  /** Points set so far of the part being drawn, m. */
   points: Place[] = [];
   /** Fingers on the picture, pixels. */
   fingers: Map<number, Place> = new Map();
   /** Material of the next balls, "" for that of the first. */
   material = "";
-  /** Told when another tool is chosen. */
+  /** Called when another tool is chosen. */
   listeners: (() => void)[] = [];
   free;
   draft = svg("g", { class: "draft" });
-  /** What leads from a ball that is held to the hand. */
+  /** The line from a held ball to the hand. */
   lead = svg("g", { class: "draft" });
   chip;
-  /** Where the next point goes, m: at the pointer, or where keys moved it. */
+  /** Place of the next point, m: at the pointer, or where keys moved it. */
   cursor: Place | null = null;
 
   constructor(
@@ -134,7 +135,7 @@ class Bench {
     home.append(menu);
   }
 
-  /** Take a tool, which stays until another is taken; one without points is put at once.
+  /** Choose a tool, which stays until another is chosen; a part without points is added at once.
    * @param moving whether it is the one that moves the view */
   set(mode: Part | null, moving = false) {
     this.points = [];
@@ -214,7 +215,7 @@ class Bench {
     front.addEventListener("touchstart", (event: TouchEvent) => {
       const { touches } = event, box = front.getBoundingClientRect();
       const at: Place = [touches[0].clientX - box.left, touches[0].clientY - box.top];
-      // The page must not scroll away under what is moved.
+      // The page must not scroll while something is moved.
       const body = !this.mode
         && (this.bodyAt(at, "touch") || this.heldAt(at));
       if (touches.length > 1 || body || this.moving) event.preventDefault();
@@ -250,7 +251,7 @@ class Bench {
     });
   }
 
-  /** Draw a line from what is held by hand to the hand. */
+  /** Draw a line from the held thing to the hand. */
   pull() {
     const { lead, lab: { hand }, stage: { view } } = this, at = hand && this.placeOf(hand);
     if (!at) lead.replaceChildren();
@@ -260,7 +261,7 @@ class Bench {
     }
   }
 
-  /** Where what is held is, m; null if it is there no more. */
+  /** Place of the held thing, m; null if it is gone. */
   placeOf(held: Held): Place | null {
     const { recording, machine, t } = this.lab;
     if ("disk" in held) {
@@ -273,7 +274,7 @@ class Bench {
     return carried(poseOf(mover, t, recording.swings.get(held.surface)), mover, [x + u, y + v]);
   }
 
-  /** What of a run that is played is caught at a place, px: a ball, or what hangs on a hinge. */
+  /** The thing that is caught at a place of a playing run, px: a ball, or a hinged surface. */
   heldAt(at: Place): Held | null {
     if (!this.catches) return null;
     const { machine } = this.lab, disk = this.ballAt(at), [x, y] = this.worldOf(at);
@@ -282,7 +283,7 @@ class Bench {
     return this.hung(surfaceAt(this.stage.posed ?? machine, x, y, reach), [x, y]);
   }
 
-  /** What hangs on a hinge, by its name, held at a place, m. */
+  /** A hinged surface, by its name, held at a place, m. */
   hung(name: string, [x, y]: Place): Held | null {
     const { machine, recording, t } = this.lab, surface = machine?.surfaces.indexOf(name);
     const mover = machine?.movers.find((one) => one.surface === surface && one.inertia > 0);
@@ -292,8 +293,8 @@ class Bench {
     return { surface: mover.surface, grip: [c * u + s * v, c * v - s * u] };
   }
 
-  /** What is chosen of a run that is played, as keys catch it: the first ball of a stream, or what
-   * hangs on a hinge by its end that is farthest from there. */
+  /** The chosen thing of a playing run, as keys catch it: the first ball of a stream, or a hinged
+   * surface at the end farthest from its hinge. */
   chosenToHold(): Held | null {
     const { lab: { machine, recording, t }, inspector: { part } } = this;
     if (!this.catches || !machine || !recording) return null;
@@ -310,10 +311,11 @@ class Bench {
 
   holding = 0;
 
-  /** Where a frame begins that chooses all that it meets, px. */
+  /** Beginning of a frame that chooses everything in it, px. */
   band: Place | null = null;
 
-  /** A finger that stays on a body chooses it too, or not any more; elsewhere it begins a frame. */
+  /** A finger that stays on a body adds it to the choice, or removes it; elsewhere it begins a
+   * frame. */
   holdDown(at: Place) {
     if (this.nameAt(at)) {
       this.pick(at, true);
@@ -330,7 +332,7 @@ class Bench {
       y: Math.min(y, py), width: Math.abs(px - x), height: Math.abs(py - y) }));
   }
 
-  /** Choose all that the frame meets that ends at a place, px, with what is chosen. */
+  /** Add everything in the frame, which ends at a place, px, to the choice. */
   catch([px, py]: Place) {
     const { stage, inspector } = this, [x, y] = this.band as Place;
     const within = ([u, v]: Place) => (u - x) * (u - px) <= 0 && (v - y) * (v - py) <= 0;
@@ -341,9 +343,9 @@ class Bench {
 
   movable = (name: string) => bodyOf(this.stage.handles, [name], 0, 0) !== null;
 
-  /** Draw with keys: arrows move the point, Enter sets it. While it is played Enter catches what is
-   * chosen, and lets go of it; arrows move the hand. Where H was pressed arrows move the
-   * view, else all that is chosen if that is several. */
+  /** Draw with keys: arrows move the point, Enter sets it. While a run plays, Enter catches the
+   * chosen thing, and releases it; arrows move the hand. After H arrows move the view, otherwise
+   * all chosen parts if there are several. */
   key({ key, shiftKey }: KeyboardEvent): boolean {
     const ways: Record<string, Place> = {
       ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1],
@@ -379,10 +381,10 @@ class Bench {
   /** Whether arrows move the view. */
   moving = false;
 
-  /** The body that is grabbed, and moves once the pointer has moved. */
+  /** The grabbed body, which moves once the pointer has moved. */
   grabbed: Handle | null = null;
 
-  /** Whether a ball that is under way is caught, instead of moved where it starts. */
+  /** Whether a moving ball is caught, instead of its starting place moved. */
   get catches() {
     const { lab } = this;
     return this.free && lab.playing && !this.mode && !this.moving;
@@ -396,7 +398,7 @@ class Bench {
     return Math.hypot(view.px(x) - px, view.py(y) - py) < Math.max(r, BALL_REACH);
   }
 
-  /** Which particle is at a place, px; -1 if none is. */
+  /** The particle at a place, px; -1 if there is none. */
   ballAt(at: Place) {
     const { machine, recording, t } = this.lab, { scale } = this.stage.view;
     const { view } = this.stage;
@@ -414,7 +416,7 @@ class Bench {
     return nearest;
   }
 
-  /** What is at a place, px: a ball, where it starts or is now, or a surface. */
+  /** The thing at a place, px: a ball, at its start or at present, or a surface. */
   nameAt(at: Place) {
     const { view, handles } = this.stage, { machine } = this.lab, [px, py] = at;
     if (!machine) return "";
@@ -431,7 +433,7 @@ class Bench {
     return ball >= 0 && few ? machine.streams[machine.releases[ball].stream] : name;
   }
 
-  /** The body at a place, px, to move it: with a finger only one that is chosen. */
+  /** The body at a place, px, to be moved: with a finger only a chosen one. */
   bodyAt(at: Place, pointer: string) {
     if (this.moving) return null;
     const { view, handles, frame } = this.stage, { parts } = this.inspector;
@@ -444,14 +446,14 @@ class Bench {
     return body && { ...body, surface: name };
   }
 
-  /** Move the body that is grabbed along. @param at pixels */
+  /** Move the grabbed body along. @param at pixels */
   carry(at: Place, event: PointerEvent) {
     const { stage, grabbed, pressed, inspector } = this;
     if (stage.held || !grabbed || !pressed) return;
     if (distance(at, pressed) < STRAY) return;
     if (!inspector.parts.includes(grabbed.surface)) inspector.choose(grabbed.surface);
     stage.hold(grabbed);
-    // This move may be the only one: where all comes late, many are told as one.
+    // This move may be the only one: if events come late, many are reported as one.
     stage.aim(event);
   }
 
@@ -464,10 +466,10 @@ class Bench {
     stage.drawOutline();
   }
 
-  /** Where a finger came down that does nothing else. */
+  /** A finger came down on nothing. */
   pressed: Place | null = null;
 
-  /** A finger went on: one moves what is shown, two make it larger or smaller, too. */
+  /** A finger moved: one moves the view, two zoom it, too. */
   look(id: number, at: Place) {
     const { view } = this.stage;
     const spread = () => {
@@ -487,7 +489,7 @@ class Bench {
     const scale = Math.min(most, Math.max(least, stage.view.scale * factor));
     stage.view.zoom(scale / stage.view.scale, px, py);
     stage.moved = true;
-    // More events than frames come.
+    // There are more events than frames.
     this.waiting ||= requestAnimationFrame(() => {
       this.waiting = 0;
       stage.rebuild();
@@ -495,7 +497,7 @@ class Bench {
     });
   }
 
-  /** Offer to show everything where little of the machine is in sight. */
+  /** Offer to show everything if little of the machine is in sight. */
   offer() {
     const { stage: { view }, lab: { machine }, lost } = this;
     if (!machine) return;
@@ -510,7 +512,7 @@ class Bench {
 
   waiting = 0;
 
-  /** The place that is meant, m. @param at pixels */
+  /** The intended place, m. @param at pixels */
   meant(at: Place, loose: boolean) {
     const { stage, lab, mode } = this, { view } = stage;
     const ball = mode && isJoint(mode.table) ? lab.machine?.releases[this.ballAt(at)] : undefined;
@@ -533,7 +535,7 @@ class Bench {
     this.sketch();
   }
 
-  /** Set a point of what is being drawn. @param at pixels */
+  /** Set a point of the part being drawn. @param at pixels */
   point(at: Place, loose: boolean) {
     this.take(this.meant(at, loose).at);
   }
@@ -553,12 +555,12 @@ class Bench {
     this.put(mode, points);
   }
 
-  /** Where the next point would be without a pointer, m. */
+  /** Place of the next point without a pointer, m. */
   next(): Place {
     return this.example()[this.points.length];
   }
 
-  /** Where a part has its points without a pointer: about a place, or the middle of what is seen.
+  /** Points of a part without a pointer: around a place, or the middle of the view.
    * @param about m */
   example(part = this.mode, about: Place = this.stage.view.middle): Place[] {
     const { view } = this.stage, [first] = part?.places ?? [];
@@ -568,7 +570,7 @@ class Bench {
       roundTo(about[1] + v * size, view.snap)]);
   }
 
-  /** Places near the middle of what is seen that are far from all that is there, best first, m. */
+  /** Places near the middle of the view and far from everything, the best first, m. */
   rooms(): Place[] {
     const { stage } = this, { view } = stage, { left, right, top, bottom } = view.free;
     const there = pointsOf(stage).flatMap(([, points]) => points);
@@ -583,7 +585,7 @@ class Bench {
       .map(({ x, y }) => [view.worldX(x), view.worldY(y)]);
   }
 
-  /** Add a part to the scene. Where its tool goes on, it is not chosen. */
+  /** Add a part to the scene. If its tool stays, the part is not chosen. */
   put(part: Part, points: Place[]) {
     const { lab } = this, { given, machine } = lab;
     if (!given) return;
@@ -595,7 +597,7 @@ class Bench {
       : part.part === "trigger" ? withTrigger(given, part, points, unit, machine, reach)
       : withPart(given, part, points, unit, this.material, start, tables[part.table]);
     lab.asked = "";
-    // What is shown stays as it is while a machine grows.
+    // The view does not change while a machine grows.
     this.stage.fitted = this.stage.moved = true;
     lab.replace(changed);
     this.sketch();
@@ -606,10 +608,10 @@ class Bench {
     if (!this.mode) this.inspector.choose(this.made);
   }
 
-  /** What was put last. */
+  /** The part added last. */
   made = "";
 
-  /** Put a part where it has room, and choose it: its handle has the focus. @param about m */
+  /** Add a part where it has room, and choose it: its handle gets the focus. @param about m */
   place(part: Part, about?: Place) {
     this.set(null);
     if (about) this.put(part, this.example(part, about));
@@ -624,7 +626,7 @@ class Bench {
     this.stage.gripOf.get(handle?.id ?? "")?.focus();
   }
 
-  /** What is set of the part that is drawn, what is still missing, and how it would be. */
+  /** The points set of the part being drawn, the missing ones, and a preview. */
   sketch() {
     const { mode, stage, chip, words, draft } = this, { view } = stage;
     draft.replaceChildren();
@@ -636,7 +638,7 @@ class Bench {
     const all = this.cursor ? [...this.points, this.cursor] : this.points;
     const pixels = all.map(([x, y]) => [view.px(x), view.py(y)] as Place);
     if (pixels.length > 1) {
-      // An arc that has its ends and a third point is that already.
+      // An arc with its ends and a third point is complete.
       const [a, b, c] = pixels;
       const turn = c && (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
       let path = `M${a}L${b}`;
@@ -666,7 +668,7 @@ class Bench {
       html("span", {}, words.say(where)), done);
   }
 
-  /** Choose what was clicked, or nothing. @param add to what is chosen, or take it out of that */
+  /** Choose the clicked part, or nothing. @param add it to the choice, or remove it from that */
   pick(at: Place, add: boolean) {
     const { inspector } = this, name = this.nameAt(at), { parts } = inspector;
     if (!add) inspector.choose(...(name ? [name] : []));
@@ -676,7 +678,7 @@ class Bench {
     }
   }
 
-  /** Rows that were copied. */
+  /** Copied rows. */
   copied: [string, Given][] = [];
 
   copy() {
@@ -684,7 +686,7 @@ class Bench {
     if (given) this.copied = rowsNamed(given, this.inspector.parts);
   }
 
-  /** Put what was copied beside itself, each time further, and choose the copies. */
+  /** Add copies beside the originals, each time further away, and choose them. */
   paste() {
     const { lab, stage, copied } = this, { scale, snap } = stage.view;
     if (!lab.given || !copied.length || !this.free) return;
@@ -704,7 +706,7 @@ class Bench {
     this.copied = before;
   }
 
-  /** Choose all that has a name of its own. */
+  /** Choose everything that has its own name. */
   all() {
     const { machine } = this.lab;
     const names = [...machine?.surfaces ?? [], ...machine?.streams ?? [],

@@ -1,11 +1,11 @@
-// What a page begins with: unpacks the rest of its data and its script, and starts both threads'
-// work meanwhile. The script runs in the page as text whose hash the page's policy allows.
+// The start of a page: unpacks the rest of its data and its script, while the threads start. The
+// script runs in the page as text whose hash the page's policy allows.
 
 import { bytesOf, compiled, unpacked } from "./core.ts";
 
 const textOf = (id: string) => document.getElementById(id)?.textContent ?? "";
 
-/** @returns the page's data, the core, and what makes threads, of which the first has begun */
+/** @returns the page's data, the core, and a maker of threads, of which the first has started */
 async function boot() {
   const data = JSON.parse(textOf("lab"));
   const source = new Blob([data.worker], { type: "text/javascript" });

@@ -1,5 +1,5 @@
-// Has the core judge a run by the laws that every run must keep, and says which it broke: what
-// results/laws.py is in Python.
+// Has the core judge a run by the laws of every run, and reports those it broke, like Python's
+// results/laws.py.
 
 import { KNOT_ROW, type Core, type Machine } from "./core.ts";
 import type { Lab } from "./lab.ts";
@@ -7,17 +7,17 @@ import type { Swings } from "./motion.ts";
 import type { Recording } from "./recording.ts";
 import type { Words } from "./words.ts";
 
-/** A whole run as the core's laws take it: all knots, and the first of each particle. */
+/** A whole run for the core's laws: all knots, and the first of each particle. */
 export type Run = { machine: Machine, knots: Float64Array, offsets: number[], books: number[],
   swings: Map<number, Swings>, gained: number, unsolved: number, contacts: number, steps: number,
   unreal: number };
 
-/** A law that is broken: by which particle first, when (s) and where (m), and beside what; -1 of
- * particle or surface if it is about all together. */
+/** A broken law: the first particle, time (s), place (m) and surface; -1 for particle or surface if
+ * it concerns all together. */
 export type Breach = { law: number, particle: number, surface: number, t: number, x: number,
   y: number };
 
-/** What the laws ask of a recording of a run that is over. */
+/** The data that the laws need from a recording of a finished run. */
 function runOf(recording: Recording): Run {
   const { machine, tracks, events, books, swings, gained, unsolved, contacts, steps } = recording;
   const offsets = [0];
@@ -34,8 +34,7 @@ function runOf(recording: Recording): Run {
   };
 }
 
-/** The laws that a run breaks, in the order in which they are told. What the core has in memory
- * stays as it is. */
+/** The laws that a run breaks, in the order of reports. The core's memory is restored. */
 function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: Run): Breach[] {
   const { gravity, tilt, interact, dt, pulley, radius, mass, inertia, joints, outlines } = machine;
   const { enums } = core.layout, end = core.get("end", "Room");
@@ -101,11 +100,11 @@ function barriersOf({ segments, arcs, pulley, movers }: Machine) {
     ({ ...row, mover: movers.findIndex(({ surface }) => surface === row.surface) + 1 }));
 }
 
-/** What is said of each law, in the order of the core's enum Law. */
+/** Texts of the laws, in the order of the core's enum Law. */
 const SAID = ["law-finite", "law-through", "law-inside", "law-energy", "law-losses", "law-ledger",
   "law-solved"];
 
-/** The line below the picture that says which law is broken. */
+/** The line below the picture about a broken law. */
 function watchLaws(line: HTMLElement, lab: Lab, words: Words) {
   lab.on("run", () => {
     const { recording } = lab, first = recording?.breaches[0];
@@ -120,7 +119,7 @@ function lawSaid(broken: Breach, { machine }: Recording, words: Words) {
     name: words.name(machine.surfaces[surface] ?? ""), particle, t: words.number(t),
     x: words.number(x), y: words.number(y),
   };
-  // What one particle has got unexplained is no solver's doing.
+  // Unexplained energy of a single particle does not come from the solver.
   const said = SAID[law] === "law-energy" && particle >= 0 ? "law-ledger" : SAID[law];
   return words.say("law-broken", { what: words.say(said, where) });
 }

@@ -1,4 +1,4 @@
-// What shows that something is chosen: dashes round it, and a card beside it, in the best place.
+// The marks of a choice: dashes round it, and a card beside it, in the best place.
 
 import { linesOfJoints, pinsOf } from "./joints.ts";
 import { cornersOf } from "./machine.ts";
@@ -10,39 +10,39 @@ import type { Stage } from "./stage.ts";
 import type { Symbols } from "./symbols.ts";
 
 type Point = [number, number];
-/** What is told of by its name: points */
+/** Points by name */
 type Named = [string, Point[]];
 
-/** Pixels from one place that is tried to the next, and that the card keeps off its part. */
+/** Distance of the places that are tried, and of the card from its part, pixels. */
 const STEP = 24, OFF = 26;
 
-/** What it costs to cover a point of what is chosen, of a path, and of anything else; a pixel away
- * from what is chosen costs one, and one from where it stood these. */
+/** Costs of covering a point of the chosen part, of a path, and of anything else; a pixel of
+ * distance from the chosen part costs one, and a pixel from the former place these. */
 const OWN = 4000, PATH = 60, OTHER = 30, STAYS = 3;
 
-/** Pixels from one of the points that stand for a line to the next. */
+/** Distance of the points that represent a line, pixels. */
 const ALONG = 22;
 
-/** What is drawn of a body at its outside, and points of one of these at most. */
+/** Elements at the outside of a body, and most points of one of them. */
 const BODIES = ".belt, .wall, rect.steel, .gauge", MOST = 200;
 
-/** Pixels from a body to the line round it, and of radius of a ball there at least. */
+/** Distance of the line round a body, and least radius of a ball there, pixels. */
 const AROUND = 6, LEAST = 3;
 
-/** Distance of the strands of a belt, in its thickness. */
+/** Distance of the strands of a belt, in its thicknesses. */
 const BELT = 4.5;
 
-/** Pixels round a box of the picture, the bar that tells the scale or the legend, that are to be
- * free; and its steps to the right. */
+/** Free margin round a box in the picture (the scale bar, the legend), and its steps to the right,
+ * pixels. */
 const CLEAR = 14, ASIDE = 38;
 
-/** Of a crowd: particles and times whose places are kept free, at most. */
+/** Most particles and times of a crowd whose places are kept free. */
 const SOME = 60, TIMES = 16;
 
 /** Pixels from bodies to the frame round several. */
 const FRAME = 12;
 
-/** Points along a line through points, those among them. */
+/** Points along a line through points, which are included. */
 function along(points: Point[]): Point[] {
   return points.flatMap(([x, y], n) => {
     const [u, v] = points[n + 1] ?? [x, y];
@@ -52,7 +52,7 @@ function along(points: Point[]): Point[] {
   });
 }
 
-/** Points along what is drawn of a machine, and where its balls start and are, px, by name. */
+/** Points along the drawing of a machine, and starts and places of its balls, px, by name. */
 function pointsOf(stage: Stage): Named[] {
   const { view, lab: { machine, recording, t } } = stage;
   const balls = machine?.releases.slice(0, MOST).map((release, i): Named => {
@@ -63,8 +63,8 @@ function pointsOf(stage: Stage): Named[] {
   return [...surfaceLines(stage).map(([name, line]): Named => [name, along(line)]), ...balls ?? []];
 }
 
-/** Surfaces and sensors as lines through points, px, by name, with the lower side of belts; what is
- * far outside of the picture is at its edge. Nothing has to be laid out for it. */
+/** Surfaces and sensors as lines through points, px, by name, with the lower side of belts; points
+ * far outside the picture are at its edge. It needs no layout by the browser. */
 function surfaceLines({ lab, view, scenery, posed: machine }: Stage): Named[] {
   if (!machine) return [];
   const px = (x: number, y: number, down = 0): Point => [
@@ -103,7 +103,7 @@ function surfaceLines({ lab, view, scenery, posed: machine }: Stage): Named[] {
   ];
 }
 
-/** Places where particles of a crowd come, px. */
+/** Places of particles of a crowd, px. */
 function passed({ view }: Stage, { tracks, begin, end }: Recording): Point[] {
   const every = Math.ceil(tracks.length / SOME);
   return tracks.filter((_, i) => i % every === 0).flatMap((track) =>
@@ -111,9 +111,10 @@ function passed({ view }: Stage, { tracks, begin, end }: Recording): Point[] {
       .flatMap((state): Point[] => (state ? [[view.px(state.x), view.py(state.y)]] : [])));
 }
 
-/** Where a box meets neither surfaces and tracks nor what is taken: from a corner up, then further
- * to the right; null where all is full.
- * @param size width and height, px @param corner its lower left one, px
+/** Place of a box that covers neither surfaces and tracks nor taken boxes: from a corner up, then
+ * further to the right; null if there is none.
+ * @param size width and height, px
+ * @param corner its lower left one, px
  * @returns its lower left corner */
 function freePlace(stage: Stage, size: Point, corner: Point, taken: Stage["covered"] = []) {
   const [wide, high] = size, [left, bottom] = corner;
@@ -134,9 +135,9 @@ function freePlace(stage: Stage, size: Point, corner: Point, taken: Stage["cover
   return null;
 }
 
-/** Dashes round what is chosen, a line round what is pointed at: below each body its own shape,
- * wider, and over that a little less wide in the colour of the ground. Round several that are
- * chosen a frame by which they are moved. */
+/** Dashes round chosen parts, a line round the part pointed at: below each body its own shape,
+ * wider, and over that a little less wide in the colour of the background. Round several chosen
+ * parts a frame by which they are moved. */
 function drawOutline(stage: Stage) {
   const { lab, view, outline, parts, pointed, scenery } = stage;
   outline.replaceChildren();
@@ -148,7 +149,7 @@ function drawOutline(stage: Stage) {
     const bodies = scenery.drawingsOf(name).flatMap((group) =>
       [...group.querySelectorAll(BODIES)].map((shape) => {
         const wide = Number(shape.getAttribute("stroke-width") ?? 0);
-        // What moves is changed where it is written: that is what stays outlined.
+        // A moving surface is changed at its place as written, which stays outlined.
         const copy = shape.cloneNode(false), body = shape.closest(".part") as Element;
         const by = [...own === "pointed" && group !== body ? [group] : [], body]
           .map((one) => one.getAttribute("transform") ?? "").join(" ").trim();
@@ -204,24 +205,24 @@ class Callout {
   ) {
     stage.over.append(this.leader);
     inspector.listeners.push(() => this.place());
-    // With more of its fields it is higher.
+    // With more fields it is higher.
     inspector.panel.addEventListener("toggle", () => this.place(), true);
     stage.drawers.push(() => this.place());
   }
 
-  /** Place it, and the labels anew where it stands elsewhere. */
+  /** Place it, and the labels again if it has moved. */
   place() {
     const { stage } = this, before = JSON.stringify(stage.covered);
-    // What is dragged has no card.
+    // A dragged part has no card.
     if (stage.held) return;
     stage.covered = this.find();
     if (JSON.stringify(stage.covered) !== before) this.symbols.draw();
   }
 
-  /** Where it stands, px, beside which parts: there it stays as long as it covers nothing. */
+  /** Its place, px, and the parts beside it; it stays there as long as it covers nothing. */
   was = { parts: "", at: [0, 0] as Point };
 
-  /** @returns the box that it covers, px */
+  /** @returns its box, px */
   find(): Stage["covered"] {
     const { inspector: { panel, parts }, stage, lab, leader } = this, { view } = stage;
     leader.setAttribute("d", "");
@@ -262,7 +263,7 @@ class Callout {
     this.was = { parts: names, at };
     const box = stage.home.getBoundingClientRect();
     panel.style.transform = `translate(${box.left + at[0]}px, ${box.top + at[1]}px)`;
-    // From the nearest point of what is chosen to the nearest of the card.
+    // From the nearest point of the chosen part to the nearest of the card.
     const edge = ([x, y]: Point): Point => [Math.min(Math.max(x, at[0]), at[0] + wide),
       Math.min(Math.max(y, at[1]), at[1] + high)];
     const far = (point: Point) => Math.hypot(edge(point)[0] - point[0], edge(point)[1] - point[1]);

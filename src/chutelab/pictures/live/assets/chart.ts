@@ -1,4 +1,4 @@
-// A small diagram in SVG: axes with round numbers, lines, and what is put over them.
+// A small diagram in SVG: axes with round numbers, lines, and elements over them.
 
 import { svg } from "./scenery.ts";
 import type { Words } from "./words.ts";
@@ -18,13 +18,13 @@ function ticks(low: number, high: number, many: number): number[] {
   return numbers;
 }
 
-/** The smallest of 1, 2 and 5 times a power of ten that is no smaller. */
+/** The smallest of 1, 2 and 5 times a power of ten that is not smaller. */
 function roundUp(size: number) {
   const ten = 10 ** Math.floor(Math.log10(size));
   return [1, 2, 5, 10].map((n) => n * ten).find((step) => step >= size * (1 - 1e-9)) ?? 10 * ten;
 }
 
-/** From the smallest to the largest, with some room; round a single value too.
+/** The range of values, with some room, also round a single value.
  * @param room share of the span */
 function rangeOf(values: number[], room: number = 0.06): Range {
   let low = Infinity, high = -Infinity;
@@ -33,12 +33,12 @@ function rangeOf(values: number[], room: number = 0.06): Range {
     if (value > high) high = value;
   }
   if (low > high) return [0, 1];
-  // Rounding is not to fill a diagram.
+  // Rounding must not fill a diagram.
   const span = Math.max(high - low, 1e-4 * Math.max(Math.abs(low), Math.abs(high), 1e-6));
   return [low - room * span, high + room * span];
 }
 
-/** Tell how wide an element is, now and whenever that changes. */
+/** Report the width of an element, now and whenever it changes. */
 function onWidth(element: Element, act: (width: number) => void) {
   new ResizeObserver(([{ contentRect: { width } }]) => {
     if (width > 0) act(Math.max(200, width));
@@ -51,7 +51,7 @@ class Chart {
   grid;
   marks;
   cursor;
-  /** Where the axes begin, px: beside the widest number. */
+  /** Left end of the axes, px: beside the widest number. */
   left = NUMBERS + GAP;
   x: Range = [0, 1];
   y: Range = [0, 1];
@@ -115,7 +115,7 @@ class Chart {
     return bottom - ((y - this.y[0]) / (this.y[1] - this.y[0] || 1)) * (bottom - TOP);
   }
 
-  /** What is at a place of the screen along the axis below. */
+  /** The value at a place of the screen along the lower axis. */
   worldX(clientX: number) {
     const box = this.root.getBoundingClientRect();
     const px = (clientX - box.left) * (this.width / box.width);
@@ -130,7 +130,7 @@ class Chart {
     this.marks.append(svg("polyline", { points: points.join(" "), class: `curve ${kind}` }));
   }
 
-  /** The outline of bars from a place on, each so wide. */
+  /** The outline of bars of a width, from a place on. */
   bars(from: number, width: number, counts: number[]) {
     const tenth = (px: number) => px.toFixed(1), base = this.py(0);
     return `M${tenth(this.px(from))} ${base}${counts.map((count, n) =>
@@ -142,14 +142,14 @@ class Chart {
     this.marks.append(svg("circle", { cx: this.px(x), cy: this.py(y), r: 3, class: `last ${kind}` }));
   }
 
-  /** A line upright across all of it. */
+  /** A vertical line across the diagram. */
   point(x: number) {
     const px = this.px(x).toFixed(1);
     this.cursor.setAttribute("d", isFinite(x) ? `M${px} ${TOP}V${this.height - BOTTOM}` : "");
   }
 }
 
-/** How many digits behind the point tell numbers apart. */
+/** Number of decimals needed to distinguish numbers. */
 function decimals(numbers: number[]) {
   const step = numbers.length > 1 ? Math.abs(numbers[1] - numbers[0]) : Math.abs(numbers[0] || 1);
   return Math.min(6, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));

@@ -1,5 +1,5 @@
-// What no scene may say: values that do not have the form of their key, keys that contradict each
-// other, names that lead nowhere. The rules are Python's, of `chutelab.scene`.
+// Faults of a scene: values that do not have the form of their key, keys that contradict each
+// other, unknown names. The rules are those of Python's `chutelab.scene`.
 import { fits, type Form } from "./forms.ts";
 import { valueOfTree } from "./formula.ts";
 import { RADIANS } from "./trig.ts";
@@ -7,7 +7,7 @@ import {
   clinging, moversOf, triggersOf, type Given, type Lab, type Point, type Scene, type Rule,
 } from "./scene.ts";
 
-/** What a `Fault` says: key, value, id of a text, and its words. */
+/** The content of a `Fault`: key, value, id of a text, and its words. */
 type Wrong = [string, unknown, string, Record<string, number | string>?];
 
 /** Tables of joints, in Python's order. */
@@ -19,10 +19,10 @@ export const isJoint = (table: string) => (JOINTS as readonly string[]).includes
 const LISTS = ["material", "pair", "conveyor", "surface", "sensor", ...JOINTS];
 const EITHER = ["particle", "plate", "stream"];
 
-/** Names of surfaces that no free one may take. */
+/** Names that free surfaces may not have. */
 const RESERVED = ["incoming", "plate", "outgoing", "particles"];
 
-/** Keys of what waits until another surface is touched. */
+/** Keys of triggers, which wait until another surface is touched. */
 export const WAITS = ["opens_when", "closes_when", "starts_when"];
 
 /** Least width and height of a view, m. */
@@ -31,12 +31,12 @@ const LEAST_VIEW = 1e-6;
 /** Tables that are for other programs. */
 const FOREIGN = ["expect", "live"];
 
-/** Returns a table of which there may be one or several as a list. */
+/** Returns a table that may occur once or several times as a list. */
 export function listOf(rows: any): Given[] {
   return rows === undefined ? [] : Array.isArray(rows) ? rows : [rows];
 }
 
-/** Returns the full path of a key of a table of which there may be one or several. */
+/** Returns the full path of a key of a table that may occur once or several times. */
 export function pathOf(given: Given, table: string, row: number, key: string) {
   return Array.isArray(given[table]) ? `${table}[${row}].${key}` : `${table}.${key}`;
 }
@@ -90,13 +90,13 @@ function* misfitsOfTable(
   }
 }
 
-/** Returns the least number that a form takes besides 0, if it takes 0. */
+/** Returns the least number above 0 that a form allows, if it allows 0. */
 function leastOf({ anyOf, not }: Form): number | undefined {
   return not ? not.exclusiveMaximum : anyOf?.map(leastOf).find((least) => least !== undefined);
 }
 
 /**
- * Yields names that are there twice, are missing, or lead nowhere.
+ * Yields names that are given twice, missing, or unknown.
  * @param kinds names of the kinds of particles
  * @param materials names
  */
@@ -154,7 +154,7 @@ export function* straysOf(
   }
 }
 
-/** Yields what contradicts each other. */
+/** Yields contradictions. */
 export function* conflictsOf(scene: Scene, given: Given, lab: Lab): Generator<Wrong> {
   yield* beltConflicts(scene);
   yield* kindConflicts(scene, given);
@@ -174,13 +174,13 @@ export function* conflictsOf(scene: Scene, given: Given, lab: Lab): Generator<Wr
   }
 }
 
-/** m; less than that is no surface. */
+/** m; least length of a surface. */
 const LEAST_LENGTH = 1e-9;
 
-/** kg; less than any atom has. */
+/** kg; less than any atom. */
 const LEAST_MASS = 1e-27;
 
-/** Straight and bent pieces of all surfaces with their copies, at most. */
+/** Most straight and bent pieces of all surfaces with their copies. */
 const MOST_PIECES = 10_000;
 
 function tooNear(a: Point | undefined, b: Point | undefined) {
@@ -199,7 +199,8 @@ function* beltConflicts(scene: Scene): Generator<Wrong> {
   if (outgoing?.drop_from === "impact") yield ["outgoing.drop_from", "impact", "drop-from-impact"];
 }
 
-/** Yields surfaces with points too near to each other, and the one with which they are too many. */
+/** Yields surfaces with points too near to each other, and the one with which there are too many
+ * pieces. */
 function* pieceConflicts(
   { incoming, outgoing, plates, conveyor, surface }: Scene,
 ): Generator<Wrong> {
@@ -227,11 +228,11 @@ function* pieceConflicts(
   }
 }
 
-/** Tells whether there are several particles that do not meet. */
+/** Whether there are several particles that do not meet. */
 const isApart = ({ count, crowded }: Scene) => count > 1 && !crowded;
 
-/** Yields what cannot hang on hinges or joints or wait for a touch, and what no engine can run that
- * was asked for. */
+/** Yields faults of hinges, joints and triggers, and features that the requested engine cannot run.
+ */
 function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
   const { streams, run } = scene, movers = moversOf(scene), waits = triggersOf(scene).length > 0;
   const clings = scene.pair.findIndex(clinging);
@@ -259,7 +260,7 @@ function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
   }
 }
 
-/** Yields what the contact engine does not have with boxes and polygons. */
+/** Yields features that the contact engine lacks for boxes and polygons. */
 function* corneredConflicts(scene: Scene, given: Given): Generator<Wrong> {
   const { particles, incoming, pair } = scene, text = "cornered";
   if (!particles.some(({ outline }) => outline.length)) return;
@@ -278,7 +279,7 @@ function* corneredConflicts(scene: Scene, given: Given): Generator<Wrong> {
   if (clings >= 0) yield [`pair[${clings}].${clinging(pair[clings])}`, undefined, text];
 }
 
-/** Tells whether points are the corners of a convex polygon, in their order. */
+/** Whether points are the corners of a convex polygon, in their order. */
 function isConvex(points: Point[]) {
   const turns = points.map(([x, y], n) => {
     const [[u, v], [p, q]] = [1, 2].map((k) => points[(n + k) % points.length]);
@@ -297,7 +298,7 @@ function* kindConflicts(scene: Scene, given: Given): Generator<Wrong> {
   }
 }
 
-/** Yields what the rules that Python has too find within a row of a table. */
+/** Yields faults within a row of a table, by the rules that Python has, too. */
 function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<Wrong> {
   const tables: Record<string, any[]> = {
     run: [scene.run], plate: scene.plates, particle: scene.particles, stream: scene.streams,

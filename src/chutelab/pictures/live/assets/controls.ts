@@ -1,4 +1,4 @@
-// Which numbers of a scene can be changed on this page, what holds them now, and how far they go.
+// The numbers of a scene that can be changed on this page, with present values and ranges.
 
 import { motionOf } from "./edit.ts";
 import { valueAt } from "./keys.ts";
@@ -15,13 +15,13 @@ type Live = { predict?: boolean, controls?: string[] | null, panels?: string[] |
 type Page = { tables: Record<string, Record<string, any>>, live?: Live, lesson?: object };
 /** A part of the scene; "scene" of the main numbers of all */
 export type Section = { table: string, row: number, name: string };
-/** What can be typed or chosen; it is the n-th `part` `of` so many. One that need not be there is
- * `free`, and undefined if it is not. */
+/** A field to be typed or chosen; it is the n-th `part` `of` so many. An optional one is `free`,
+ * and undefined if not given. */
 export type Field = { key: string, table: string, owner: string, name: string, part: number,
   of: number, unit: string, low: number, high: number, value: any, form: Form, free: boolean,
   choices?: string[] };
 
-/** A key of the only plate can be written in two ways: this is one of them. */
+/** A key of the only plate can be written in two ways; return one of them. */
 const plainKey = (key: string) => key.replace(/^(\w+)\[0\]/, "$1");
 
 /** Whether a key is another one, or a part of it. */
@@ -34,14 +34,14 @@ function mayChange({ live }: Page, key: string) {
   return !controls || controls.some((one) => isPartOf(key, one) || isPartOf(one, key));
 }
 
-/** Whether things may be drawn and deleted: where not only some keys can be changed. */
+/** Whether parts may be drawn and deleted: unless only some keys can be changed. */
 const mayDraw = ({ live, lesson }: Page) =>
   !lesson && !live?.controls && (!live?.panels || live.panels.includes("edit"));
 
-/** Whether the scene names what can be changed: few enough to be shown together. */
+/** Whether the scene names the keys that can be changed, few enough to be shown together. */
 const showsFew = ({ live }: Page) => Boolean(live?.controls);
 
-/** The handles of what can be changed. */
+/** The handles of keys that can be changed. */
 function openHandles(handles: Handle[], page: Page) {
   return handles.flatMap((handle) => {
     const { axes, values } = handle;
@@ -62,7 +62,7 @@ function openHandles(handles: Handle[], page: Page) {
   });
 }
 
-/** Where the rule of a key is: `surface.from` of `surface[2].from[0]`. */
+/** The path of a key's rule: `surface.from` for `surface[2].from[0]`. */
 function homeOf(key: string) {
   const plain = key.replace(/\[\d+\]/g, "");
   return plain.includes(".") ? plain : `scene.${plain}`;
@@ -76,7 +76,8 @@ function boundsOf(page: Page, key: string) {
   return { unit: rule?.unit ?? "", low, high };
 }
 
-/** All that can be chosen; what has no place in the picture has its table's name before its own. */
+/** Everything that can be chosen; things without a place in the picture have their table's name
+ * before their own. */
 function sectionsOf(scene: Scene, given: Given): Section[] {
   const found: Section[] = [{ table: "scene", row: 0, name: "scene" }];
   const add = (table: string, rows: any[]) => rows.forEach((one, row) =>
@@ -110,10 +111,10 @@ function rowOf(scene: Scene, { table, row, name }: Section): any {
   return Array.isArray(rows) ? rows[row] : rows;
 }
 
-/** Tables of what particles meet. */
+/** Tables of things that particles meet. */
 const SURFACES = ["incoming", "plate", "outgoing", "conveyor", "surface"];
 
-/** What is first to be changed in any scene, by table. */
+/** Keys shown first in any scene, by table. */
 const MAIN: Record<string, string[]> = {
   scene: ["gravity"], incoming: ["speed", "pulley_radius"],
   plate: ["angle_deg", "distance", "restitution", "friction"],
@@ -121,10 +122,10 @@ const MAIN: Record<string, string[]> = {
   particle: ["radius", "mass"],
 };
 
-/** Keys of what hangs on a hinge. */
+/** Keys of a hinge. */
 const HINGED = ["hinge", "mass", "inertia", "spring", "rest_deg", "damper", "stops_deg", "motor"];
 
-/** Keys of a motion that say nothing while it moves otherwise. */
+/** Keys of motions that have no effect with another motion. */
 function still({ given }: any, table: string): string[] {
   const motion = motionOf(given), canStart = motion === "hinge" ? given.motor : motion !== "still";
   return [...(canStart ? [] : ["starts_when"]), ...(motion === "hinge" ? ["turn"] : HINGED), ...(given.shake ? [] : ["shake"]),
@@ -133,7 +134,7 @@ function still({ given }: any, table: string): string[] {
       ? ["pivot"] : [])];
 }
 
-/** Keys that say nothing as the others are. */
+/** Keys without effect, given the values of the others. */
 function idle({ incoming, particles, streams, kinds }: Scene, table: string, row: any): string[] {
   const moves = table === "surface" || table === "plate" ? still(row, table) : [];
   if (table === "surface") {
@@ -166,12 +167,12 @@ function valueOf(scene: Scene, section: Section, key: string) {
   if (which < 0 || ["stream", "material", "pair"].includes(section.table)) {
     return key.split(".").reduce((found, part) => found?.[part], row);
   }
-  // It may be the material's.
+  // The value may come from the material.
   const value = met(scene, 0, section.name)[which];
   return value === Infinity ? "adhesion" : value;
 }
 
-/** What can be changed of a section, in the order of the rules; of the scene, its main numbers. */
+/** The fields of a section, in the order of the rules; for the scene, its main numbers. */
 function fieldsOf(page: Page, given: Given, scene: Scene, section: Section): Field[] {
   if (section.table === "scene") {
     const isMain = ({ table, row }: Section) => MAIN[table] && row === 0;
@@ -183,7 +184,7 @@ function fieldsOf(page: Page, given: Given, scene: Scene, section: Section): Fie
   return ownFields(page, given, scene, section);
 }
 
-/** The forms that a value may have, each by itself. */
+/** The alternative forms of a value. */
 const formsOf = (form: Form): Form[] => form.anyOf?.flatMap(formsOf) ?? [form];
 
 const isNested = (form: Form) => formsOf(form).some(({ prefixItems, items }) =>
@@ -255,11 +256,11 @@ function ownFields(page: Page, given: Given, scene: Scene, section: Section): Fi
   return fields;
 }
 
-/** What was typed or chosen, as the scene has it: nothing takes the key away.
- * @throws {Fault} if it is out of the field's range, or is none of what may be there */
+/** The typed or chosen value as in the scene; nothing removes the key.
+ * @throws {Fault} if it is out of the field's range, or not allowed there */
 function checked(field: Field, text: string, words: Words): any {
   const { key, low, high, form, free } = field;
-  // The unit that stands beside the field may be typed with the number.
+  // The unit shown beside the field may be typed with the number.
   const unit = words.unit(field.unit), typed = text.trim();
   const plain = unit && /\d/.test(typed) && typed.endsWith(unit)
     ? typed.slice(0, -unit.length).trim() : typed;

@@ -1,35 +1,35 @@
-// The core in memory, what `chutelab.core` is in Python: `Memory`; and its contact engine, what
-// engines/contact.py is: `Core`. A machine goes in, knots and events come out.
+// The core in memory, like Python's `chutelab.core`: `Memory`; and its contact engine, like
+// engines/contact.py: `Core`. A machine goes in, knots and events come out.
 
 type Struct = { size: number, fields: Record<string, [number, string, number]> };
 export type Layout = { structs: Record<string, Struct>, enums: Record<string, Record<string,
   number>>, constants: Record<string, number> };
-/** Of a run that goes on after a change: spins, rad/s, by how much particles have turned, rad, and
- * which are under way already */
+/** For a run that continues after a change: spins, rad/s, angles of particles, rad, and which are
+ * already under way */
 export type Machine = import("./machine.ts").Machine & { spins?: number[], angles?: number[],
   goesOn?: boolean[] };
 export type Event = { t: number, x: number, y: number, before: number[], after: number[],
   normal: number, tangent: number, disk: number, other: number, kind: number,
   surface: number };
 
-// Friction without a bound, as a number that can be multiplied by zero.
+// Stands for unbounded friction; finite, so that it can be multiplied by zero.
 const GREATEST = 1e300;
 
 /** Doubles of a knot: t, x, y, vx, vy, spin, three entries of the ledger; its disk; and its
  * angle, of what has corners. */
 const KNOT_ROW = 11;
 
-/** Doubles of what all particles have at a step: t, kinetic, potential, three entries of the
- * ledger, overlap; energy at the releases, and of all springs what they kept when they were tied,
- * keep, lost to dampers and gave. */
+/** Doubles of the totals of all particles at a step: t, kinetic, potential, three entries of the
+ * ledger, overlap; energy at the releases; for all springs energy when tied, present energy, loss
+ * in dampers and work. */
 const TOTAL_ROW = 12;
 
-/** Numbers of a bin of a surface: impulses that press it, along it, of both in x and y, their
- * moment (N s, N m s), and places by what presses there (N s m). */
+/** Numbers of a bin of a surface: normal and tangential impulse, the whole in x and y, its moment
+ * (N s, N m s), and places times normal impulses (N s m). */
 const LOAD_ROW = 7;
 
-/** What was compressed, of text: 13 bits of two letters, 6 of one that is left, see `page.py`.
- * What is no such text gives no core, as the engine then says. */
+/** Compressed bytes from text: 13 bits per two letters, 6 for a single last one, see `_packed` in
+ * `live/__init__.py`. Other text gives no valid core, which the engine reports. */
 function bytesOf(text: string) {
   const values = Array.from({ length: 128 }, (_, code) =>
     code - 33 - Number(code > 34) - Number(code > 60) - Number(code > 92));
@@ -48,11 +48,11 @@ function bytesOf(text: string) {
 /** Letters of packed text. */
 const LETTERS = 91;
 
-/** What was compressed by zlib. */
+/** Decompress data of zlib. */
 const unpacked = (packed: ArrayBuffer) =>
   new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate")));
 
-/** Compile what a page carries: the core, compressed by zlib. */
+/** Compile the core of a page, compressed by zlib. */
 async function compiled(wasm: ArrayBuffer) {
   return WebAssembly.compile(await unpacked(wasm).arrayBuffer());
 }
@@ -61,11 +61,10 @@ async function startCore(module: WebAssembly.Module, layout: Layout) {
   return new Core(await WebAssembly.instantiate(module, {}), layout);
 }
 
-/** Structs of which the core has one each, and arrays that their fields point to, which it lays
- * out. */
+/** Structs of which the core has exactly one, and the arrays that their fields point to. */
 class Memory {
   exports: any;
-  /** Where the structs of the core's subjects are, by their names. */
+  /** Addresses of the structs of the core's parts, by name. */
   subjects: Record<string, number>;
   bytes = new Uint8Array();
   doubles = new Float64Array();
@@ -87,7 +86,7 @@ class Memory {
     Object.keys(this.subjects).forEach((name) => this.reset(name));
   }
 
-  /** Call a function that may take more memory; the views of it are made anew. */
+  /** Call a function that may allocate memory; the views of it are made again. */
   work(name: string, ...numbers: number[]): number {
     const found = this.exports[name](...numbers);
     this.look();
@@ -100,7 +99,7 @@ class Memory {
     this.bytes.fill(0, this.subjects[of], this.subjects[of] + this.layout.structs[of].size);
   }
 
-  /** Look at the memory anew; it moves when it grows. */
+  /** Get the memory again; it moves when it grows. */
   look() {
     const { buffer } = this.exports.memory;
     if (buffer === this.bytes.buffer) return;
@@ -142,12 +141,12 @@ class Memory {
   }
 }
 
-/** One run at a time: `begin` lays a machine out, `proceed` runs on, `take` hands over. */
+/** One run at a time: `begin` sets up a machine, `proceed` runs on, `take` returns results. */
 class Core extends Memory {
   machine: Machine | null = null;
-  /** States of hinges that have been taken. */
+  /** Number of states of hinges taken. */
   swung = 0;
-  /** Bins of loads that have been taken. */
+  /** Number of bins of loads taken. */
   borne = 0;
 
   /** Fill in fields of one row of an array. */
@@ -163,7 +162,7 @@ class Core extends Memory {
     }
   }
 
-  /** Lay out a machine: the run is at its beginning then. */
+  /** Set up a machine, at the beginning of its run. */
   begin(machine: Machine) {
     this.machine = machine;
     this.swung = this.borne = 0;
@@ -232,8 +231,8 @@ class Core extends Memory {
     this.fill("pairs", "Pair", kind * columns + column, row);
   }
 
-  /** Run on for at most so many steps. What has been written is in `take`; it has to be taken
-   * before the next call. */
+  /** Run on for at most so many steps. The results have to be taken by `take` before the next call.
+   */
   proceed(steps: number): "running" | "done" | "stalled" {
     const { Status } = this.layout.enums, status = this.exports.run(steps);
     this.look();
@@ -259,7 +258,7 @@ class Core extends Memory {
     return { knots, events, swings: this.takeSwings(), totals };
   }
 
-  /** States of hinges that were not taken yet, `SWING_ROW` numbers each; the core keeps all. */
+  /** States of hinges not taken so far, `SWING_ROW` numbers each; the core keeps all. */
   takeSwings(): number[] {
     const count = this.get("swing_count"), begin = this.get("swings"), rows: number[] = [];
     const { size, fields } = this.layout.structs.Swing;
@@ -271,13 +270,13 @@ class Core extends Memory {
     return rows;
   }
 
-  /** When what waits for a touch acted, s; Infinity of what still waits. */
+  /** Times at which triggers acted, s; Infinity for those that did not. */
   triggered(): number[] {
     return this.rows("triggers", "Trigger", this.get("trigger_count")).map(({ t }) => t);
   }
 
-  /** Loads of surfaces, `LOAD_ROW` numbers each, in bins from one on: the latest, or at the end
-   * all, since what has slept is told of when it wakes. */
+  /** Loads of surfaces, `LOAD_ROW` numbers each, from a bin on: the latest, or at the end all,
+   * since loads of sleeping particles are added when they wake. */
   takeLoads(over: boolean): { from: number, rows: Float64Array } {
     const used = this.get("used", "Loads"), wide = this.get("owner_count", "Loads") * LOAD_ROW;
     const { interact, dt, loads } = this.machine as Machine;
@@ -288,9 +287,9 @@ class Core extends Memory {
     return { from, rows: this.doubles.slice(begin + from * wide, begin + used * wide) };
   }
 
-  /** How far those under way have come, as rows of knots; only between steps of a run whose
-   * particles meet. Of what lasts in contact it is the latest state with a balance that closes. The
-   * latest state that waits to become a knot comes before it, and of a blow that before it, too. */
+  /** The present states of particles under way, as rows of knots; only between steps of a run whose
+   * particles meet. In lasting contact it is the latest state with a closed balance. It is preceded
+   * by the latest state that may become a knot, and for an impact also by the state before it. */
   tips() {
     const { Disk, Track } = this.layout.structs, { Mode } = this.layout.enums;
     const { WAITS } = this.layout.constants;
@@ -324,7 +323,7 @@ class Core extends Memory {
     return new Float64Array(rows);
   }
 
-  /** Why each track ended, see enum Reason; only once the run is done. */
+  /** The reason of each track's end, see enum Reason; only after the run. */
   reasons() {
     const { size, fields } = this.layout.structs.Disk;
     return Array.from({ length: this.get("disk_count") }, (_, i) =>

@@ -1,33 +1,32 @@
-// The numbers of a crowd: how many, how much, where they arrive, what belts pay, what surfaces
-// take.
+// The numbers of a crowd: counts, flow, arrivals, power of belts, losses at surfaces.
 
 import type { Arrival } from "./arrival.ts";
 import type { Recording } from "./recording.ts";
 
-/** Counts: of those that touched the outgoing belt or what lies on it, and the belt itself; t/h
- * that arrive, of the slice; m of the arrivals; J and W of all belts; J by surface. NaN and no
- * losses where they are not known */
+/** Counts of particles that touched the outgoing belt or what lies on it, and the belt itself; flow
+ * of arrivals in the slice, t/h; places of arrivals, m; work and power of all belts, J and W;
+ * losses by surface, J. NaN and no losses if unknown */
 export type CrowdNumbers = { released: number, arrived: number, landed: number, flow: number,
   mean: number, spread: number, quantiles: number[], work: number, power: number, losses: [string,
   number][] };
 
-/** Particles from which on they are a crowd, as in Python's pictures. */
+/** Least number of particles of a crowd, as in Python's pictures. */
 const FEWEST = 20;
 
-/** Arrivals from which on they have a flow. */
+/** Least number of arrivals for a flow. */
 const FLOW = 8;
 
-/** Shares of the arrivals that lie before a place, and of paths on the right of a line. */
+/** Quantiles of arrivals, and of paths from right to left. */
 const QUANTILES = [0.02, 0.5, 0.98];
 
-/** The value below which a share of sorted values lies, straight between two of them. */
+/** A quantile of sorted values, interpolated linearly. */
 function quantile(sorted: number[], share: number) {
   const at = share * (sorted.length - 1), low = Math.floor(at);
   const high = Math.min(low + 1, sorted.length - 1);
   return sorted.length ? sorted[low] + (at - low) * (sorted[high] - sorted[low]) : NaN;
 }
 
-/** How many of some in the order of time are not after t (s). */
+/** Number of those, in the order of time, that are not after t (s). */
 function countUntil(ordered: { t: number }[], t: number) {
   let low = 0, high = ordered.length;
   while (low < high) {
@@ -38,13 +37,13 @@ function countUntil(ordered: { t: number }[], t: number) {
   return low;
 }
 
-/** Mass per time of the middle half of those that come at times, t/h; NaN of fewer than `FLOW`.
+/** Mass flow of the middle half of arrivals, t/h; NaN for fewer than `FLOW`.
  * @param coming in the order of time */
 function flowOf(coming: { t: number, mass: number }[]) {
   const [first, last] = [0.25, 0.75].map((share) => Math.floor(share * (coming.length - 1)));
   const passed = coming.length < FLOW ? NaN : coming[last].t - coming[first].t;
   if (!(passed > 0)) return NaN;
-  // The first of them comes as the time begins.
+  // The first of them arrives at the beginning of the time span.
   const middle = coming.slice(first + 1, last + 1);
   return (3.6 * middle.reduce((sum, { mass }) => sum + mass, 0)) / passed;
 }

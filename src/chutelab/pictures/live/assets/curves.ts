@@ -1,4 +1,4 @@
-// Place, velocity and energy of one particle over time, to be read off under a line that is moved.
+// Place, velocity and energy of one particle over time, with a movable line to read values.
 
 import { Chart, onWidth, rangeOf } from "./chart.ts";
 import { card, follow, html } from "./panels.ts";
@@ -7,7 +7,7 @@ import type { Recording, Ledger } from "./recording.ts";
 import type { Words } from "./words.ts";
 
 type Sample = { t: number } & Record<string, number>;
-/** `name` of the value, `kind` of how it is drawn */
+/** `name` of the value, `kind` of the line */
 type Line = { name: string, kind: string };
 
 const DIAGRAMS: { id: string, unit: string, lines: Line[] }[] = [
@@ -23,13 +23,13 @@ const DIAGRAMS: { id: string, unit: string, lines: Line[] }[] = [
 /** Times between the first and the last at which curves are drawn. */
 const MANY = 160;
 
-/** Knots of a track at which curves are drawn exactly; of more, none can be seen. */
+/** Most knots at which curves are drawn exactly; with more they are too dense to see. */
 const MOST_KNOTS = 300;
 
-/** Of a time, just before it: what an impact changes has two values then. */
+/** Share of the span by which a sample is before a time: an impact has two values. */
 const JUST = 1e-9;
 
-/** Place, velocity and energies of a particle at a time; null if it is not there. */
+/** Place, velocity and energies of a particle at a time; null if it is not under way. */
 function sampleAt(recording: Recording, index: number, t: number): Sample | null {
   const track = recording.tracks[index], state = track.state(t);
   if (!state) return null;
@@ -91,7 +91,7 @@ class CurvesPanel {
     this.listen();
   }
 
-  /** Where the line stands, s; if it is not moved, now. */
+  /** Time of the line, s; the present time unless it is moved. */
   cursor: number | null = null;
 
   samples: Sample[] = [];
@@ -142,7 +142,7 @@ class CurvesPanel {
     if (!samples.length) return;
     const times = samples.map(({ t }) => t);
     const span = rangeOf(times, 0), track = recording.tracks[this.index], last = track.count - 1;
-    // Nothing follows the blow with which a track ends: what it leaves are dots.
+    // Nothing follows the impact with which a track ends; its values after it are dots.
     const isBlow = last > 0 && track.at(last - 1, 0) === track.at(last, 0);
     const until = isBlow ? times.indexOf(span[1]) : times.length;
     DIAGRAMS.forEach(({ unit, lines }, n) => {
@@ -164,7 +164,7 @@ class CurvesPanel {
     this.read();
   }
 
-  /** Whether energies are told in mJ. */
+  /** Whether energies are shown in mJ. */
   get small() {
     return this.samples.every(({ kinetic, potential }) => Math.max(kinetic, potential) < 1);
   }
@@ -173,7 +173,7 @@ class CurvesPanel {
     return name.length > 2 ? this.words.say(`energy-${name}`) : name;
   }
 
-  /** Move the line, and tell what it crosses. */
+  /** Move the line, and show the values that it crosses. */
   read() {
     const { lab, words, samples } = this;
     if (!lab.recording || !samples.length || !lab.recording.tracks[this.index]) return;
@@ -198,7 +198,7 @@ class CurvesPanel {
     this.board.setAttribute("aria-valuetext", told.join(", "));
   }
 
-  /** The same as numbers, if they are wanted. */
+  /** The same as numbers, on request. */
   tabulate() {
     const { words, samples } = this;
     if (!this.values.open) return;

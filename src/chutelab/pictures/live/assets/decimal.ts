@@ -1,9 +1,9 @@
-// Numbers in digits as Python writes them: what is exactly halfway goes to the even digit.
+// Numbers in digits as Python writes them: exact halves are rounded to the even digit.
 
 /** Whether a number, rounded to so many digits behind the point, is exactly halfway between two.
  * @param size >= 0 */
 function isHalfway(size: number, places: number) {
-  // Then it is an odd number of halves of the last digit, which binary numbers have in few cases.
+  // Then it is an odd number of halves of the last digit, which few binary numbers are.
   return places >= 0 ? (size * 2 ** (places + 1)) % 2 === 1
     : size % 10 ** -places === 0.5 * 10 ** -places;
 }

@@ -1,4 +1,4 @@
-// A student's numbers from the name, and what follows from them, as Python's
+// A student's numbers from the name, and values computed from them, like Python's
 // `exercises/exercise.py`.
 
 import { generalText } from "./decimal.ts";
@@ -23,12 +23,12 @@ const STANDARD_GRAVITY = 9.81;
 /** Relative difference within which an answer counts as right. */
 const TOLERANCE = 0.01;
 
-/** An answer smaller than that in its unit has no digits to judge. */
+/** Smallest right answer in its unit; a smaller one has too few digits to judge. */
 const LEAST_ANSWER = 1e-9;
 
 const MOST_DRAWS = 1000;
 
-/** Powers of ten, either way: from micro to mega. */
+/** Most powers of ten up or down: from micro to mega. */
 const MOST_TENS = 6;
 
 /** A template of the catalogue with its names filled in. */
@@ -72,8 +72,9 @@ class DrawnNumbers {
   }
 }
 
-/** What any question knows, with what each makes of a right answer of 1, by the key of its name.
- * @param ofAngle whether degrees are asked for, which have no kg or g */
+/** General mistakes of any question, with the wrong answer if the right one is 1, by the key of its
+ * name.
+ * @param ofAngle whether the answer is in degrees, which have no kg or g */
 function generalMistakes(exercise: Exercise, ofAngle: boolean): [string, string, number][] {
   const its = (id: string, values = {}) => worded(exercise, id, values);
   const found: [string, string, number][] = [
@@ -98,7 +99,7 @@ class Case {
   /** The question's own mistakes. */
   own: Trace[];
 
-  /** @param right as a machine gives it; else the formula does */
+  /** @param right answer of a machine; by default the formula's */
   constructor(
     readonly question: Question, readonly numbers: DrawnNumbers,
     readonly right: number = numbers.of(question.answer),
@@ -115,7 +116,7 @@ class Case {
         ? [{ called: worded(exercise, id), says, number: this.right * factor }] : []))];
   }
 
-  /** A mistake of its own, and what is common on top of it. */
+  /** A mistake of its own, combined with a common one. */
   get pairs(): Trace[] {
     const { exercise } = this.numbers, { general, angle } = this.question;
     const of = angle ? "-angle" : "";
@@ -130,16 +131,16 @@ class Case {
     })));
   }
 
-  /** Whether the right answer is another one where g is. */
+  /** Whether the right answer depends on g. */
   get feelsGravity() {
     const { question: { answer }, numbers: { exercise, drawn } } = this;
-    // Both by the formula: a machine's answer may have other last digits.
+    // Both by the formula, as a machine's answer may differ in the last digits.
     const [here, elsewhere] = [1, 1.001].map((share) =>
       new DrawnNumbers(exercise, drawn, share * STANDARD_GRAVITY).of(answer));
     return Math.abs(elsewhere - here) > 1e-9 * Math.max(Math.abs(elsewhere), Math.abs(here));
   }
 
-  /** Whether the right answer and every mistake can be told from each other. */
+  /** Whether the right answer and all mistakes can be told apart. */
   get clear() {
     const wrong = this.mistakes.map(({ number }) => number), all = [this.right, ...wrong];
     if (!all.every(Number.isFinite) || Math.abs(this.right) < LEAST_ANSWER) return false;
@@ -151,13 +152,12 @@ class Case {
 /** A letter without its case, as Unicode folds it. */
 function folded(letter: string) {
   if (letter === "ı") return letter;
-  // Of this script the capitals are the older letters.
+  // In this script the capitals are the older letters.
   if (/\p{Script=Cherokee}/u.test(letter)) return letter.toUpperCase();
   return letter.toLowerCase().toUpperCase().toLowerCase();
 }
 
-/** A name without what people do not mean to differ in: case, spaces, Unicode forms; "Berg, Mia" is
- * "mia berg". */
+/** A name normalised in case, spaces and Unicode forms; "Berg, Mia" is "mia berg". */
 const plainName = (student: string) => Array.from(student.normalize("NFKC"), folded).join("")
   .replace(/^([^,]*[^,\s][^,]*),([^,]*[^,\s][^,]*)$/s, "$2 $1").split(/\s+/).filter(Boolean).join(" ");
 
@@ -167,13 +167,13 @@ function drawnAt(exercise: Exercise, student: string, attempt: number) {
   for (const [name, , , , values] of exercise.parameters) {
     const key = [exercise.name, plainName(student), name, attempt].join("\n");
     const [high, low] = sha256(key), { length } = values;
-    // The first 64 bits, and the remainder of that.
+    // The first 64 bits, and their remainder.
     drawn[name] = values[((high % length) * (2 ** 32 % length) + (low % length)) % length];
   }
   return drawn;
 }
 
-/** Whether a draw is one that the lesson is about, and all mistakes can be told apart. */
+/** Whether a draw fulfils the lesson's conditions, and all mistakes can be told apart. */
 function fitsLesson(numbers: DrawnNumbers) {
   const { fits, questions } = numbers.exercise;
   try {

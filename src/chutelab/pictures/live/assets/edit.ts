@@ -1,4 +1,4 @@
-// Parts added, copied and taken away: each a scene made of another.
+// Parts added, copied and removed: each function makes a scene from another.
 
 import { gapToArc, gapToSegment } from "./arrival.ts";
 import { JOINTS, WAITS, isJoint, listOf } from "./checks.ts";
@@ -15,7 +15,7 @@ export type Part = { part: string, letter: string, table: string, places: string
 /** Tables whose rows have names. */
 const NAMED = ["surface", "conveyor", "plate", "stream", "sensor"];
 
-/** Tables of what is no place, chosen by its table and its name or number. */
+/** Tables of things without a place, chosen by table and name or number. */
 const PLAIN = ["material", "pair"];
 
 /** Keys that are places, or lists of them. */
@@ -26,11 +26,11 @@ const BALL = 0.02;
 
 const either = (rows: any[]) => (rows.length === 1 ? rows[0] : rows);
 
-/** Rows with names of a table; of the stream that a scene has without writing it, one. */
+/** Named rows of a table; one for the stream that a scene has by default. */
 const rowsOf = (given: Given, table: string): Given[] =>
   (table === "stream" && given.stream === undefined ? [{}] : listOf(given[table]));
 
-/** A name that nothing has yet. */
+/** An unused name. */
 function freeName(given: Given, stem: string) {
   const taken = new Set([...NAMED, "particle", "material"].flatMap((table) =>
     listOf(given[table]).map(({ name }) => name)));
@@ -39,13 +39,14 @@ function freeName(given: Given, stem: string) {
   return `${stem}${n}`;
 }
 
-/** Put a row at the end of its table. */
+/** Append a row to its table. */
 const withRow = (given: Given, table: string, row: Given): Given => (table === "incoming"
   ? { ...given, incoming: row } : { ...given, [table]: [...rowsOf(given, table), row] });
 
 const roundOff = (value: number, digits: number) => Number(value.toFixed(digits));
 
-/** The keys of the arc from a point to another through a third, or of the line that they are on. */
+/** The keys of the arc from one point to another through a third, or of the line if they are on
+ * one. */
 function arcOf(a: Point, c: Point, b: Point): Given {
   const [ux, uy, vx, vy] = [b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]];
   const twice = 2 * (ux * vy - uy * vx), u = ux * ux + uy * uy, v = vx * vx + vy * vy;
@@ -62,13 +63,13 @@ function arcOf(a: Point, c: Point, b: Point): Given {
   };
 }
 
-/** Keys of a part that are of the kind of its particles. */
+/** Keys of a part that belong to the kind of its particles. */
 const KIND = ["shape", "size", "mass", "spin", "material"];
 
-/** A kind of balls or boxes of a material, made where there is none; without one the first kind.
- * @param radius m, of balls that are made
- * @param box keys of boxes that are made; none of balls
- * @returns the scene, and the name of the kind where there are several */
+/** A kind of balls or boxes of a material, made if necessary; without a material the first kind.
+ * @param radius m, of new balls
+ * @param box keys of new boxes; none for balls
+ * @returns the scene, and the name of the kind if there are several */
 function withKind(
   given: Given, material: string, radius: number, box: Given,
 ): [Given, string | undefined] {
@@ -79,7 +80,7 @@ function withKind(
   const wanted = material || (box.material ?? "steel");
   const known = alike.find((one) => one.material === wanted);
   if (known) return [given, kinds.length > 1 ? known.name : undefined];
-  // Where there are several, each has a name.
+  // If there are several, each has a name.
   kinds = kinds.map((one) => ({ name: freeName(given, "kind"), ...one }));
   const name = kinds.some((one) => one.name === wanted) ? freeName(given, wanted) : wanted;
   const size = alike.length ? alike[0].radius ?? 0.0063 : radius;
@@ -87,12 +88,13 @@ function withKind(
   return [{ ...given, particle: [...kinds, { ...made, name, material: wanted }] }, name];
 }
 
-/** Of each particle its stream by name, and which of it: what it is called while streams change. */
+/** For each particle the name of its stream and its number there, which stay when streams change.
+ */
 const calledOf = (given: Given) => rowsOf(given, "stream").flatMap(({ name, count = 1 }, n) =>
   Array.from({ length: count }, (_, k) => `${k} ${name ?? (n ? `stream${n + 1}` : "stream")}`));
 
-/** A scene whose joints hold the particles that they held before its streams were changed; joints
- * of what is gone are gone. */
+/** A scene whose joints hold the same particles as before its streams were changed, without joints
+ * of removed ones. */
 function retied(before: Given, after: Given): Given {
   if (!JOINTS.some((table) => after[table])) return after;
   const was = calledOf(before), now = new Map(calledOf(after).map((name, i) => [name, i]));
@@ -110,15 +112,15 @@ function retied(before: Given, after: Given): Given {
 }
 
 /** The particles that are released at a place, the nearest first.
- * @param reach m, from the centres of those that are smaller */
+ * @param reach m, from the centres of smaller particles */
 function particlesAt({ releases, radius }: Machine, [px, py]: Point, reach: number): number[] {
   const far = releases.map(({ x, y }) => Math.hypot(x - px, y - py));
   return [...far.keys()].filter((i) => far[i] <= Math.max(radius[i], reach))
     .sort((a, b) => far[a] - far[b]);
 }
 
-/** A scene with one more joint; where it is to hold a particle and none is there, a ball is made.
- * @param points the end, of a pin its place, m, and that of the particle
+/** A scene with one more joint; if there is no particle at its place, a ball is made.
+ * @param points the end (of a pin its place), m, and that of the particle
  * @param ball of the palette
  * @param reach m, from the centre of a particle */
 function withJoint(
@@ -135,7 +137,7 @@ function withJoint(
   const row: Given = { particle: own ?? count };
   if (pin) Object.assign(row, { from: first }, ends.length > 1 && { other: ends[1] });
   else Object.assign(row, other === undefined ? { from: first } : { other });
-  // So that its weight makes it longer by a share of what is seen.
+  // So that its weight stretches it by a share of the view.
   const mass = machine?.mass[own ?? 0] ?? 0.26 * unit ** 3;
   if (part.table === "spring") row.stiffness = Number((60 * mass / unit).toPrecision(1));
   const streams = rowsOf(made, "stream");
@@ -144,7 +146,7 @@ function withJoint(
     ({ ...one, interact: true })) }, part.table, row);
 }
 
-/** A scene with a line that goes when a surface is touched; where none is, one is made.
+/** A scene with a line that disappears when a surface is touched, which is made if necessary.
  * @param points its ends, and one of that surface, m */
 function withTrigger(
   given: Given, part: Part, [from, to, [x, y]]: Point[], unit: number,
@@ -160,8 +162,8 @@ function withTrigger(
 }
 
 /** A scene with one more part.
- * @param points that were set, m
- * @param unit m that a metre of the part's own sizes becomes
+ * @param points set, m
+ * @param unit m for one metre of the part's own sizes
  * @param material of particles, "" for that of the first
  * @param start s, when a stream begins
  * @param rules of the part's table */
@@ -181,7 +183,7 @@ function withPart(
       : rules[key]?.unit === "m" && typeof value === "number" ? roundOff(value * unit, 6)
         : structuredClone(value);
   }
-  // What stands upright has a left and a right.
+  // A vertical line has a left and a right side.
   if (row.passes) {
     const [dx, dy] = [0, 1].map((n) => Math.abs(points[1][n] - points[0][n]));
     if (dx < dy) row.passes = "right";
@@ -201,8 +203,8 @@ function withPart(
   return withRow(kinds, "stream", row);
 }
 
-/** A scene with one more material, as a known one is, or one more pair, of the first things that
- * can meet.
+/** A scene with one more material, like a known one, or one more pair, of the first things that can
+ * meet.
  * @param known keys of a material
  * @param surfaces names */
 function withRowOf(
@@ -216,7 +218,7 @@ function withRowOf(
   return { ...named, [table]: [...listOf(given[table]), row] };
 }
 
-/** Rows of things by name: what a copy is made of. Joints have what their particles are called. */
+/** Rows of things by name, for copies. Joints have the names of their particles. */
 function rowsNamed(given: Given, names: string[]): [string, Given][] {
   const own = NAMED.flatMap((table) => listOf(given[table])
     .filter(({ name }) => names.includes(name)).map((row): [string, Given] => [table, row]));
@@ -255,7 +257,7 @@ function withCopies(given: Given, rows: [string, Given][], [dx, dy]: Point): [Gi
     made.push(copy);
     return withRow(scene, table, copy);
   }, given);
-  // What is copied with what it waits for waits for the copy.
+  // If a part is copied with the surface of its trigger, the copy waits for the copied surface.
   for (const copy of made) {
     for (const when of WAITS) {
       const touched = copies.get(copy[when]?.touched);
@@ -286,7 +288,7 @@ function surfaceAt(
   return all.reduce((best, one) => (one[1] < best[1] ? one : best), ["", reach])[0];
 }
 
-/** A scene with another name of a thing, wherever it is meant.
+/** A scene with a new name of a thing, wherever it is used.
  * @param key its full path */
 function withName(given: Given, key: string, name: string): Given {
   const old = valueAt(given, key), renamed = withValues(given, { [key]: name });
@@ -307,7 +309,7 @@ function withName(given: Given, key: string, name: string): Given {
   return renamed;
 }
 
-/** The ends of lines and arcs of a machine, m, but for those of some parts. */
+/** The ends of lines and arcs of a machine, m, except those of some parts. */
 function endsOf({ surfaces, segments, arcs }: Machine, not: string[]): Point[] {
   const isOther = ({ surface }: { surface: number }) => !not.includes(surfaces[surface]);
   const lines = segments.filter(isOther).flatMap(({ ends: [x, y, u, v] }) =>
@@ -319,7 +321,7 @@ function endsOf({ surfaces, segments, arcs }: Machine, not: string[]): Point[] {
     Number(value.toPrecision(12))) as Point);
 }
 
-/** Parts of a scene taken away by name; what remains without particles has no stream. */
+/** A scene without some parts, by name; without particles there is no stream. */
 function without(given: Given, ...names: string[]): Given {
   const rest = { ...given };
   for (const table of NAMED) {
@@ -333,13 +335,13 @@ function without(given: Given, ...names: string[]): Given {
   }
   for (const table of ["incoming", "outgoing"]) if (names.includes(table)) delete rest[table];
   for (const table of [...PLAIN, ...JOINTS]) {
-    // What is said of two goes with each of them.
+    // Pairs are removed with either of the two.
     const rows = listOf(given[table]).filter(({ name, between = [] }, n) =>
       ![`${table} ${name ?? n + 1}`, ...between].some((one) => names.includes(one)));
     if (rows.length) rest[table] = rows;
     else delete rest[table];
   }
-  // Nothing waits for what is gone.
+  // Remove triggers of removed parts.
   const isGone = ({ touched }: Given = {}) => touched && names.includes(touched);
   const freed = (row: Given) => Object.fromEntries(Object.entries(row)
     .filter(([key, value]) => !WAITS.includes(key) || !isGone(value)));
@@ -350,7 +352,7 @@ function without(given: Given, ...names: string[]): Given {
   return retied(given, rest);
 }
 
-/** How a row of a plate or a surface moves. */
+/** The motion of a row of a plate or surface. */
 const motionOf = ({ turn, shake, travel, hinge }: Given) => (hinge ? "hinge" : travel ? "travels"
   : shake ? "shakes" : turn ? "turns" : "still");
 
@@ -358,10 +360,10 @@ const motionOf = ({ turn, shake, travel, hinge }: Given) => (hinge ? "hinge" : t
 const MOVES = ["turn", "shake", "travel", "hinge", "mass", "inertia", "spring", "rest_deg",
   "damper", "stops_deg", "motor", "starts_when"];
 
-/** A scene in which a part moves otherwise, by the motion's usual numbers.
+/** A scene in which a part has another motion, with default numbers.
  * @param path of its row
- * @param pivot what it turns about, m
- * @param unit m that are large in the picture */
+ * @param pivot m
+ * @param unit m that look large in the picture */
 function withMotion(
   given: Given, path: string, motion: string, [x, y]: Point, unit: number,
 ): Given {
@@ -376,7 +378,7 @@ function withMotion(
   return withValues(given, { [path]: { ...row, ...begun[motion] } });
 }
 
-/** Whether `without` takes something away. */
+/** Whether `without` removes something. */
 const canGo = (given: Given, name: string) =>
   JSON.stringify(without(given, name)) !== JSON.stringify(given);
 

@@ -1,4 +1,4 @@
-// The energy ledger as two bars that close: what was put in, and where it is.
+// The energy ledger as two bars of equal height: the energy put in, and where it is.
 
 import { card, follow, html, icon } from "./panels.ts";
 import type { Lab } from "./lab.ts";
@@ -13,17 +13,17 @@ const SIGNS: Entry[] = [
   ["residual", 1],
 ];
 
-/** What there is only with hinges and springs that have such. */
+/** Entries that exist only with hinges and springs. */
 const KEPT: Record<string, string[]> = { spring: ["spring", "stiffness"], damper_loss: ["damper"] };
 
 /** A residual below this part of the whole is rounding, and not shown. */
 const TINY_RESIDUAL = 1e-12;
 
-/** J; what reads as 0. */
+/** J; less is shown as 0. */
 const UNSEEN = 5e-13;
 
-/** What was put in, and where it is: an entry of the other sign changes sides. A residual that is
- * only rounding is in neither. */
+/** The energy put in, and where it is: an entry of the opposite sign changes sides. A residual by
+ * rounding is in neither. */
 function stacks(ledger: Ledger) {
   const entries = SIGNS.map(([name, sign]) => [name, sign * ledger[name]] as Entry);
   const side = (sign: number) =>
@@ -36,7 +36,7 @@ function stacks(ledger: Ledger) {
 /** The ledger with heights from the lowest point of the run, so that no part of it is negative. */
 function groundedLedger(recording: Recording, t: number) {
   const ledger = recording.ledger(Math.min(t, recording.end)), { machine } = recording;
-  // Only of those that are there: the others have no part in the ledger yet.
+  // Only of released particles, as others have no part in the ledger yet.
   const low = recording.tracks.reduce((sum, track, i) => (track.begin <= t
     ? sum + machine.mass[i] * machine.gravity * track.lowest : sum),
   machine.movers.reduce((sum, { moment }) =>
@@ -63,7 +63,7 @@ class EnergyPanel {
       html("table", {}, html("tbody", {}, ...this.rows)), this.closes,
       html("p", { class: "note" }, words.say("energy-note")));
     home.append(panel);
-    // What moves gives energy as belts do.
+    // Moving surfaces give energy as belts do.
     const given = this.rows[1].firstChild.lastChild;
     lab.on("run", () => {
       this.longest = 0;
@@ -73,7 +73,7 @@ class EnergyPanel {
     follow(lab, panel, ["time", "run"], () => this.refresh());
   }
 
-  /** J that the bars have room for; 0 if it is not known yet. */
+  /** Energy at full height of the bars, J; 0 if it is not known yet. */
   longest = 0;
 
   refresh() {

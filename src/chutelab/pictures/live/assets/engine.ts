@@ -1,4 +1,4 @@
-// The picture's side of the worker: asks for runs, and hands on what comes back of the latest.
+// The picture's side of the worker: requests runs, and passes on results of the latest.
 
 import type { Breach, Run } from "./breaches.ts";
 import type { Event } from "./core.ts";
@@ -29,7 +29,7 @@ class Engine {
     worker.postMessage({ type: "load", module, layout });
   }
 
-  /** Whether the thread did not start, or broke: no run comes back then. */
+  /** Whether the thread did not start, or broke down, so that no results come. */
   broken = false;
 
   onFailure = () => {};
@@ -39,15 +39,15 @@ class Engine {
     this.onFailure();
   }
 
-  /** Hear no more of the latest run. */
+  /** Ignore further results of the latest run. */
   stop() {
     this.id += 1;
     this.onChunk = () => {};
   }
 
   /** Begin a run, and end the one before.
-   * @param until s, to which one whose particles meet runs on
-   * @param pushes that it has had */
+   * @param until s, end of a run whose particles meet
+   * @param pushes so far */
   run(machine: Machine, until: number, onChunk: (chunk: Chunk) => void, pushes: Push[] = []) {
     this.id += 1;
     this.until = until;
@@ -55,7 +55,7 @@ class Engine {
     this.worker.postMessage({ type: "run", id: this.id, machine, until, pushes });
   }
 
-  /** Have the latest run judged by the laws that every run must keep. */
+  /** Have the latest run judged by the laws of every run. */
   judge(run: Run, onLaws: (breaches: Breach[]) => void) {
     this.onLaws = onLaws;
     this.worker.postMessage({ type: "judge", id: this.id, run });

@@ -1,5 +1,5 @@
-// The paths of a stream as a whole: between which lines 96 % of them pass, and the one in the
-// middle. The same as the envelopes of Python's `results/stream.py`.
+// The envelope of the paths of a stream: the lines between which 96 % of them pass, and the middle
+// one. The same as in Python's `results/stream.py`.
 
 import { FEWEST, QUANTILES, quantile } from "./crowd.ts";
 import type { Arrival } from "./arrival.ts";
@@ -9,22 +9,22 @@ type Point = [number, number];
 /** Edge to the right, middle, edge to the left, m; NaN where there is none */
 export type Envelope = { stream: number, lines: Point[][] };
 
-/** Paths that an envelope is made of, at most; of more, evenly chosen ones. */
+/** Most paths for an envelope; from more, some are chosen evenly. */
 const MOST_PATHS = 400;
 
-/** Distances between two places by which its lines may go on from one to the next. */
+/** Largest jump of a line from one place to the next, in distances between places. */
 const JUMP = 5;
 
-/** Share of the cuts from which on lines end where an edge runs back. */
+/** Beyond this share of the cuts, lines end where an edge turns back. */
 const LATE = 2 / 3;
 
-/** Share of the way that the direction of a cut looks ahead, and back. */
+/** Share of the way, ahead and back, that defines the direction of a cut. */
 const LOOK_AHEAD = 1 / 60;
 
-/** Instants of the way at which paths are looked at, and places at which they are cut. */
+/** Times at which paths are sampled, and number of cuts. */
 const MOMENTS = 400, CUTS = 60;
 
-/** The value at x of straight lines through points, as far as they reach.
+/** Linear interpolation between points at x, constant beyond them.
  * @param xs ascending */
 function between(x: number, xs: number[], ys: number[]) {
   let low = 0, high = xs.length - 1;
@@ -40,13 +40,13 @@ function between(x: number, xs: number[], ys: number[]) {
 
 const median = (values: number[]) => quantile(values.sort((a, b) => a - b), 0.5);
 
-/** Evenly from 0 to a last value. */
+/** Equally spaced values from 0 to a last one. */
 const evenly = (last: number, many: number) => Array.from({ length: many }, (_, n) =>
   (n < many - 1 ? n * (last / (many - 1)) : last));
 
 /** The envelopes of the streams of a run, as far as it has come. A path is that of a particle from
- * its release to its arrival on the outgoing belt, or to its end. A stream has none whose particles
- * are all there at once, or whose paths are fewer than `FEWEST`, or lead nowhere.
+ * its release to its arrival on the outgoing belt, or to its end. A stream has none if its
+ * particles are released at once, or if it has fewer than `FEWEST` paths, or they lead nowhere.
  * @param arrivals of each particle */
 function envelopesOf(
   { machine, tracks }: Recording, arrivals: (Arrival | undefined)[],
@@ -98,7 +98,7 @@ function envelope(own: { track: Track, end: number }[]): Point[][] | null {
     const isPassed = 2 * crossed.length >= own.length;
     const offsets = QUANTILES.map((share) => (isPassed ? quantile(crossed, share) : NaN));
     offsets.forEach((off, q) => lines[q].push([x - off * ty, y + off * tx]));
-    // Where half of the particles come to lie, the way turns round, and cuts go through the rest.
+    // Where half of the particles lie, the way turns round, and cuts go through the others.
     const ends = n && lines.some((line) => {
       const [dx, dy] = [line[n][0] - line[n - 1][0], line[n][1] - line[n - 1][1]];
       return Math.hypot(dx, dy) > JUMP * at[1] || (n > LATE * CUTS && dx * tx + dy * ty < 0);
@@ -108,10 +108,11 @@ function envelope(own: { track: Track, end: number }[]): Point[][] | null {
   return lines;
 }
 
-/** How far to the left of a place a path crosses the cut there, m; null where it does not. It
- * crosses where it goes from behind the cut to before it: of several times the one that is nearest
- * to the way's.
- * @param since s @param clock s of the way
+/** Distance to the left of a place at which a path crosses the cut there, m; null if it does not.
+ * It crosses where it goes from behind the cut to ahead of it; of several times the one nearest to
+ * the way's counts.
+ * @param since s
+ * @param clock s of the way
  * @param tangent across which the cut is */
 function crossing(
   path: (number[] | null)[], since: number[], clock: number, [x, y]: Point, [tx, ty]: Point,

@@ -15,7 +15,7 @@ import type { Verdict } from "./judging.ts";
 import type { Lab } from "./lab.ts";
 import type { Words } from "./words.ts";
 
-/** Signs of verdicts; the words always say it too. */
+/** Signs of verdicts; the words always say the same. */
 const MARKS: Record<Verdict, string> = {
   blank: "○", right: "✓", mistake: "↻", off: "↻", unread: "?",
 };
@@ -24,7 +24,7 @@ const MARKS: Record<Verdict, string> = {
 const isInWords = ({ kind, asks }: { kind: string, asks: { choices: string[] }[] }) =>
   kind === "explain" && asks.some(({ choices }) => !choices.length);
 
-/** Events that formulas read off, by their kind in the core. */
+/** Events used by formulas, by their kind in the core. */
 const READ_OFF: Record<number, string> = {
   1: "separation", 3: "impact", 4: "landing",
 };
@@ -36,7 +36,7 @@ function machineOf(scene: Given, numbers: DrawnNumbers): Given {
   return withValues(scene, Object.fromEntries(values));
 }
 
-/** What a run tells, by the names of quantities: first events, and energies (J) by surface. */
+/** Values of a run by the names of quantities: first events, and energies (J) by surface. */
 function toldByRun(events: Event[], books: number[][], surfaces: string[]) {
   const by_surface = Object.fromEntries(surfaces.map((name, row) => {
     const [belt_work, restitution_loss, friction_loss] = books[row];
@@ -49,8 +49,9 @@ function toldByRun(events: Event[], books: number[][], surfaces: string[]) {
   return told;
 }
 
-/** The right answers as the machine gives them, by question from 0 on; none where no machine does.
- * @param page its data @param engine that nothing else uses */
+/** The right answers of the machine, by question from 0 on; none without a machine.
+ * @param page its data
+ * @param engine not used elsewhere */
 function measured(
   scene: Given, page: any, numbers: DrawnNumbers, engine: Engine,
 ): Promise<Map<number, number>> {
@@ -112,7 +113,7 @@ class Questions {
     return html("button", { class: kind, ...(id ? { id } : {}), click: act }, text);
   }
 
-  /** Have the machine with a student's numbers say what is right. */
+  /** Get the right answers from the machine with a student's numbers. */
   async measure() {
     if (!this.exercise.questions.some((question) => question.measured)) return;
     const engine = this.newEngine(), { first, data } = this.lab;
@@ -177,17 +178,17 @@ class Questions {
       mark.className = `mark ${verdict}`;
       state.textContent = task.state(n);
       hint.disabled = read === hints.length;
-      // After all hints, or a right answer, the way may be seen.
+      // After all hints, or a right answer, the working may be seen.
       working.hidden = !((read === hints.length && standing.tries > 0) || verdict === "right" || revealed);
       working.disabled = revealed;
     };
     return { section, update };
   }
 
-  /** What is explained in one's own words. */
+  /** The explanation in the student's own words. */
   explanation() {
     const { exercise, task, lab } = this;
-    // A step that explains has asked for it.
+    // A step with an explanation has asked for it.
     if (!exercise.explain || lab.data.lesson.steps.some(isInWords)) return [];
     const field = html("textarea", { id: "explain", maxlength: String(LONGEST_WORDS), rows: "4" });
     field.value = task.explained;
@@ -199,7 +200,7 @@ class Questions {
       html("b", {}, this.words.say("exercise-explain")), html("br"), exercise.explain), field];
   }
 
-  /** Something has changed: show it, and have it kept. */
+  /** Something has changed: show it, and save it. */
   tell() {
     this.refresh();
     this.changed();
@@ -208,7 +209,7 @@ class Questions {
   refresh() {
     const { task } = this;
     for (const { update } of this.rows) update();
-    // It shows what its questions ask for.
+    // It shows the answers to its questions.
     this.machine.hidden = !this.exercise.questions.some(({ measured: tree }) => tree)
       || this.exercise.questions.some(({ measured: tree }, n) =>
         tree && task.standings[n].answer === null && !task.standings[n].revealed);

@@ -5,7 +5,7 @@ import type { Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
 
-/** What a picture of its own needs of the page's style. */
+/** The parts of the page's style that a separate picture needs. */
 const KEPT = ["fill", "stroke", "stroke-width", "stroke-linecap", "stroke-dasharray", "opacity",
   "font-family", "font-size", "font-style", "paint-order", "text-anchor", "dominant-baseline",
   "display", "stop-color", "stroke-linejoin", "font-weight"];
@@ -16,10 +16,10 @@ const DENSE = 2;
 /** Frames of a video in a second, and bits in a second. */
 const FRAMES = 30, BITS = 6e6;
 
-/** The end is seen for so long, ms: an encoder that is behind loses the last frames else. */
+/** Time that the end is shown, ms; otherwise a slow encoder would lose the last frames. */
 const TAIL = 400;
 
-/** What browsers write, the best first. */
+/** Formats that browsers write, the best first. */
 const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "video/mp4"];
 
 type Layers = [HTMLImageElement, HTMLImageElement];
@@ -27,7 +27,7 @@ type Layers = [HTMLImageElement, HTMLImageElement];
 class Film {
   button = document.getElementById("film") as HTMLButtonElement;
   recorder: MediaRecorder | null = null;
-  /** What lies below the particles and above them, as of a moment ago. */
+  /** Cached layers below and above the particles. */
   layers: Layers | null = null;
   canvas = document.createElement("canvas");
 
@@ -44,7 +44,7 @@ class Film {
     this.button.setAttribute("aria-pressed", String(Boolean(this.recorder)));
   }
 
-  /** Play, and record what is seen until the run is over or the button is pressed again. */
+  /** Play, and record the picture until the run is over or the button is pressed again. */
   async start() {
     const { lab, stage, canvas } = this;
     const mimeType = TYPES.find((type) => globalThis.MediaRecorder?.isTypeSupported(type));
@@ -97,7 +97,7 @@ class Film {
     if (this.layers) compose(this.canvas, this.stage, this.layers);
   }
 
-  /** Draw belts and labels anew as often as there is time for it. */
+  /** Draw belts and labels again as often as time allows. */
   async renew() {
     while (this.recorder) {
       this.layers = await layersOf(this.stage);
@@ -106,14 +106,14 @@ class Film {
   }
 }
 
-/** What lies below the particles, and what lies above them. */
+/** The layers below and above the particles. */
 async function layersOf(stage: Stage): Promise<Layers> {
   const { width, height } = stage.view;
   return [await drawnSvg(stage.back, stage.back, width, height),
     await drawnSvg(stage.front, stage.over, width, height)];
 }
 
-/** Draw all that is seen of the stage over a whole canvas. */
+/** Draw everything visible on the stage over a whole canvas. */
 function compose(canvas: HTMLCanvasElement, stage: Stage, [below, above]: Layers) {
   const context = canvas.getContext("2d") as CanvasRenderingContext2D;
   context.fillStyle = stage.colour("stage");

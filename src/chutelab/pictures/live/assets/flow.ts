@@ -1,5 +1,5 @@
-// What passes a line that one draws, and the sensors of a scene: how many, how many a second, where
-// across it, and how fast.
+// Passages through a line drawn by the user, and through the sensors of a scene: number, rate,
+// places and speeds.
 
 import { Chart, onWidth, roundUp } from "./chart.ts";
 import { QUANTILES, countUntil, quantile } from "./crowd.ts";
@@ -13,11 +13,11 @@ import type { Words } from "./words.ts";
 
 type Point = [number, number];
 
-/** When a centre passes the line, s; where, m from the line's first end; 1 where it comes from the
- * left of the line, seen from its first end, -1 where it comes from the right; and m/s. */
+/** Time at which a centre passes the line, s; place, m from the line's first end; 1 if it comes
+ * from the left of the line, seen from its first end, -1 if from the right; and speed, m/s. */
 export type Passage = { t: number, at: number, way: number, speed: number, disk: number };
 
-/** Halvings until the instant of a passage is known to rounding, as in Python. */
+/** Halvings until the time of a passage is known to rounding, as in Python. */
 const HALVINGS = 60;
 
 /** Bars of the flow over time, about, and the least time of one, s. */
@@ -26,14 +26,14 @@ const BARS = 12, SHORTEST = 0.01;
 /** Columns of a knot. */
 const X = 1, Y = 2, VX = 3, VY = 4;
 
-/** The passages of a track between two of its knots, its curve cut where its distance from the line
- * is largest or smallest: in each part it grows or falls throughout. */
+/** The passages of a track between two of its knots. Its curve is divided where its distance from
+ * the line is largest or smallest, so that the distance is monotone in each part. */
 function passagesOf(
   track: Track, disk: number, i: number, [ax, ay]: Point, [bx, by]: Point,
 ): Passage[] {
   const long = Math.hypot(bx - ax, by - ay), [ux, uy] = [(bx - ax) / long, (by - ay) / long];
   const t = track.at(i, 0), h = track.at(i + 1, 0) - t;
-  // No time passes in a blow, which may move a centre by its rounding.
+  // No time passes in an impact, which may move a centre by rounding.
   if (!(long > 0)) return [];
   // Distance to the left of the line, and its rate, at the knots and on the curve between them.
   const off = (k: number) => (track.at(k, Y) - ay) * ux - (track.at(k, X) - ax) * uy;
@@ -72,17 +72,17 @@ class Passing {
   ends: Point[] = [];
   /** Those found so far, in the order of time. */
   passages: Passage[] = [];
-  /** Of which tracks, with how many knots of each looked at. */
+  /** The tracks, with the number of knots read of each. */
   tracks: Track[] = [];
   seen: number[] = [];
 
-  /** Between other places, m: count anew. */
+  /** The line has moved, m: count again. */
   move(ends: Point[]) {
     this.ends = ends;
     this.tracks = [];
   }
 
-  /** Look at what the run has added. */
+  /** Read what the run has added. */
   count(recording: Recording) {
     const { ends: [from, to] } = this;
     if (this.tracks !== recording.tracks) {
@@ -100,7 +100,7 @@ class Passing {
     if (more.length) this.passages = [...this.passages, ...more].sort((a, b) => a.t - b.t);
   }
 
-  /** How many have passed up to a time. @param t s */
+  /** Number of passages up to a time. @param t s */
   until = (t: number) => countUntil(this.passages, t);
 }
 
@@ -147,7 +147,7 @@ class Flow extends Passing {
     return Math.max(SHORTEST, roundUp((end - begin) / BARS));
   }
 
-  /** How many a second pass at a time: in the bar of the time that it is in, as far as it has come.
+  /** Passages per second at a time: in its bar, as far as the run has come.
    * @param t s */
   perSecond(t: number) {
     const { step } = this, from = Math.max(t - step, this.lab.start);
@@ -170,7 +170,7 @@ class Flow extends Passing {
       { below: "t / s", beside: "1/s" });
     rate.marks.append(svg("path", { class: "bins", d: rate.bars(from * step, step, counts) }));
     if (mean) rate.line([first, last], [mean, mean], "curve-b");
-    // From the middle of the line, as far as it reaches.
+    // From the middle of the line to its ends.
     const [[ax, ay], [bx, by]] = this.ends, half = 0.5 * Math.hypot(bx - ax, by - ay);
     const places = passages.map(({ at }) => 1e3 * (at - half));
     const { from: left, width, counts: many } = histogram(places);
@@ -180,7 +180,7 @@ class Flow extends Passing {
       svg("path", { class: "bins filled", d: across.bars(left, width, many) }));
   }
 
-  /** What has passed up to the time that is shown. */
+  /** Passages up to the time shown. */
   fill() {
     if (!this.ends.length || !this.lab.recording) return;
     this.rate.point(this.lab.t);
@@ -188,7 +188,7 @@ class Flow extends Passing {
     this.head.replaceChildren(html("b", {}, rate), ` ${more.join(", ")}`);
   }
 
-  /** In words: how many a second, how many so far, and how many came back. */
+  /** In words: rate, number so far, and number that came back. */
   get says() {
     this.count(this.lab.recording as Recording);
     const { words, lab: { t } } = this, n = this.until(t);
@@ -201,14 +201,14 @@ class Flow extends Passing {
   }
 }
 
-/** Passages the way that counts on, and back; 1/s, m/s and its quantiles, kg/s, and t/h of all the
- * width of the material. NaN where it is not known */
+/** Passages forward and back; 1/s, m/s and its quantiles, kg/s, and t/h of the material's whole
+ * width. NaN if unknown */
 export type Reading = { count: number, back: number, rate: number, speed: number,
   speeds: number[], flow: number, whole: number };
 
-/** What passages tell, as Python's `reading`: a rate is from the first of them to the last.
+/** The reading of passages, like Python's `reading`: rates are from the first of them to the last.
  * @param mass of each particle, kg
- * @param slices how many the material is wide; NaN if that is not said */
+ * @param slices width of the material in slices; NaN if not given */
 function readingOf(passages: Passage[], mass: number[], slices: number): Reading {
   const on = passages.filter(({ way }) => way > 0), count = on.length;
   const span = count > 1 ? on[count - 1].t - on[0].t : 0;
@@ -242,7 +242,7 @@ class SensorsPanel {
     follow(lab, this.panel, ["run", "time", "scene"], () => this.draw());
   }
 
-  /** Have those that are there now. */
+  /** Show the present sensors. */
   name() {
     const sensors = this.lab.scene?.sensor ?? [], before = this.counts;
     this.counts = new Map(sensors.map(({ name, from, to }) => {
@@ -253,7 +253,7 @@ class SensorsPanel {
     this.panel.hidden = !sensors.length;
   }
 
-  /** What each tells up to the time that is shown. */
+  /** Readings up to the time shown. */
   get readings(): [string, Reading][] {
     const { recording, scene, t } = this.lab, [stream] = scene?.streams ?? [];
     const wide = scene && stream?.width !== undefined
@@ -268,7 +268,7 @@ class SensorsPanel {
   draw() {
     const { words } = this;
     const { readings } = this;
-    // Without a width it is the slice's, as of a crowd's numbers.
+    // Without a width it belongs to the slice, like a crowd's numbers.
     const isWhole = readings.some(([, { whole }]) => isFinite(whole));
     this.flowHead.textContent = words.say(isWhole ? "sensor-whole" : "sensor-flow");
     this.body.replaceChildren(...readings.map(([name, one]) => {

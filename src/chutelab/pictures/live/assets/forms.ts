@@ -1,4 +1,4 @@
-// What a value has to look like: as much of JSON Schema as scene files need.
+// Forms of values: the part of JSON Schema that scene files need.
 
 /** A JSON Schema */
 export interface Form {
@@ -19,7 +19,7 @@ export interface Form {
   items?: Form;
 }
 
-/** Half of a character that takes two, without the other. */
+/** A lone surrogate. */
 const LONE_HALF = /\p{Surrogate}/u;
 
 /** Tells whether a value has a form. */
@@ -54,7 +54,7 @@ function isInRange(
 }
 
 function fitsText(value: string, { maxLength, pattern }: Form) {
-  // Counted as Python does, by characters and not by their halves.
+  // Count characters like Python, not surrogates.
   const short = maxLength === undefined || [...value].length <= maxLength;
   return short && !LONE_HALF.test(value) && (!pattern || new RegExp(pattern, "u").test(value));
 }

@@ -1,5 +1,5 @@
-// Formulas of rules and exercises: trees that Python's parser made of them
-// (`scene/conflicts.py`), and what exercises know besides their own names.
+// Formulas of rules and exercises: trees made by Python's parser (`scene/conflicts.py`), and
+// functions of exercises.
 
 import { fixedText } from "./decimal.ts";
 import { separationWithSlip, transfer } from "./transfer.ts";
@@ -8,8 +8,8 @@ export type Tree = string | number | boolean | any[];
 /** The value of a name; undefined if it has none */
 type Scope = (name: string) => unknown;
 
-/** A function was asked for what it has no value of, such as the arccos of more than 1: Python's
- * ValueError. */
+/** A function has no value at its argument, such as the arccos of more than 1: Python's ValueError.
+ */
 class DomainError extends Error {}
 
 function inDomain(value: number) {
@@ -41,7 +41,7 @@ const KNOWN: Record<string, unknown> = {
 
 const positive = (x: number, value: number) => inDomain(x > 0 ? value : NaN);
 
-/** What formulas know besides names of their own. */
+/** Functions in formulas, besides their own names. */
 const known = (name: string) => (Object.hasOwn(KNOWN, name) ? KNOWN[name] : undefined);
 
 const OPERATIONS: Record<string, (a: number, b: number) => number | boolean> = {
@@ -102,7 +102,7 @@ function called(
   return act(...given, all);
 }
 
-/** The closed form as formulas call it: Python's names, and a list for several at once. */
+/** The closed form for formulas: Python's names, and a list for several at once. */
 const carried = (gravity: number) => (named: Record<string, any>) => {
   const { length: many = 0 } = Object.values(named).find(Array.isArray) ?? [];
   const one = (n: number) => {
@@ -125,7 +125,7 @@ function closedForm(
 ): Record<string, number> {
   const { numbers } = transfer({ ...given, asPrinted: rebound === "as-printed" });
   if (friction === Infinity) return numbers;
-  // Where it slips before it leaves, formulas ask for nothing later.
+  // If it slips before it leaves, formulas need nothing later.
   return separationWithSlip({ ...given, friction });
 }
 

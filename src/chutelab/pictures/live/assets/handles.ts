@@ -1,17 +1,17 @@
-// What can be taken hold of: where it is, which keys of the scene it moves, and how far.
+// Handles: their place, the keys of the scene that they change, and their range.
 
 import { particlesAt } from "./edit.ts";
 import type { Machine } from "./machine.ts";
 import { namesOfJoints } from "./joints.ts";
 import { ruleOf, type Joint, type Moves, type Point, type Scene } from "./scene.ts";
 
-/** A number of the scene; `part` of one that is a point */
+/** A number of the scene; `part` is its index in a point */
 type Axis = { key: string, part?: number, value: number, unit: string, step: number,
   low: number, high: number };
-/** `what` is a word of the catalogue; `drag` tells the axes' values for a place in the world, of
- * which `values` makes those of the scene where the axes are no keys of it.
- * One of a tool takes them by `change` itself, and may say more than its values. One of a `whole`
- * body has the axes of all its places. `fixed` is the point that it is at an angle to. */
+/** `what` is a word of the catalogue; `drag` gives the axes' values for a place in the world, from
+ * which `values` computes those of the scene if the axes are not its keys. A tool's handle takes
+ * them by `change`, and may show more than its values. A handle of a `whole` body has the axes of
+ * all its places. `fixed` is the point from which its angle is measured. */
 export type Handle = { id: string, surface: string, what: string,
   shape: "point" | "end" | "turn" | "arrow",
   x: number, y: number, from?: [number, number], axes: Axis[],
@@ -19,15 +19,15 @@ export type Handle = { id: string, surface: string, what: string,
   values?: (numbers: number[]) => Record<string, unknown>,
   says?: string, whole?: boolean, fixed?: [number, number], places?: [number, number][] };
 
-/** m of arrow for each m/s. */
+/** Length of an arrow per speed, m per m/s. */
 const ARROW = 0.08;
 
-/** m beyond the plate, where the outgoing belt is taken hold of. */
+/** Place of the outgoing belt's handle, m beyond the plate. */
 const AHEAD_OF_PLATE = 0.1;
 
 const DEGREE = Math.PI / 180;
 
-/** Of the way of a turning handle: so near to a particle it is meant. */
+/** Share of the distance of a turning handle: a particle this close is meant. */
 const NEAR = 0.5;
 
 /** Steps of arrow keys by unit. */
@@ -37,7 +37,7 @@ class Handles {
   list: Handle[] = [];
 
   /** @param lab the page's data
-   * @param away m of a turning handle beyond the end that it turns */
+   * @param away distance of a turning handle beyond its end, m */
   constructor(
     readonly scene: Scene, readonly machine: Machine, readonly lab: any, readonly away = 0,
   ) {
@@ -71,7 +71,7 @@ class Handles {
     this.list.push({ id, surface, what, shape, x: at[0], y: at[1], axes, drag, from, fixed });
   }
 
-  /** A handle beyond an end that turns all about a point.
+  /** A handle beyond an end that turns everything about a point.
    * @param now degrees
    * @param values of the scene, for an angle */
   turning(
@@ -142,7 +142,7 @@ class Handles {
       [end[0] - at * c - 0.03 * s, end[1] - at * s + 0.03 * c], [c, s], incoming.speed);
     if (!outgoing) return;
     const top = radius - outgoing.drop, last = outgoing.start + outgoing.length;
-    // Ahead of the plate, where it is in the picture; the belt may be long.
+    // Ahead of the plate, inside the picture, as the belt may be long.
     const plate = this.scene.plates.find(({ pivot }) => !pivot);
     const ahead = radius + (plate ? plate.distance + AHEAD_OF_PLATE : 0);
     const middle = Math.min(Math.max(ahead, outgoing.start), last);
@@ -190,7 +190,7 @@ class Handles {
     });
   }
 
-  /** Places that belong to how something moves. */
+  /** Places that belong to a motion. */
   motion({ pivot, hinge, travel }: { pivot?: Point } & Moves, table: string, name: string) {
     const places: [string, string, Point | "pivot" | undefined][] = [
       ["hinge", "hinge", hinge], ["travel.to", "goal", travel?.to],
@@ -245,7 +245,7 @@ class Handles {
         const { from_deg: begin, to_deg: end } = row, mean = 0.5 * (begin + end);
         this.turning(row.name, [x, y], middle, mean, `${table}.from_deg`, (angle) => {
           const by = angle - mean, fit = by > 0 ? -360 : 360;
-          // Angles go once round either way.
+          // Angles go up to one turn either way.
           const out = [begin + by, end + by].some((one) => Math.abs(one) > 360) ? fit : 0;
           return { [`${table}.from_deg`]: begin + by + out, [`${table}.to_deg`]: end + by + out };
         });
@@ -326,7 +326,7 @@ class Handles {
         (x, y) => [x, y], undefined, stream.at);
     }
     if (!velocity) return;
-    // Beside the ball, which is grabbed itself: one that is let go at rest has it there, too.
+    // Beside the ball, which can itself be grabbed, also for a ball released at rest.
     const [x, y] = [stream.at[0] + this.away, stream.at[1]], [vx, vy] = velocity;
     this.add(`${table}.velocity`, stream.name, "velocity", "arrow",
       [x + ARROW * vx, y + ARROW * vy], [0, 1].map((part) =>
@@ -335,15 +335,15 @@ class Handles {
   }
 }
 
-/** What places a body, by the name of the handle. */
+/** Words of handles that place a body. */
 const PLACES = ["pivot", "center", "height", "release", "hinge", "goal", "anchor"], ENDS = ["begin", "end", "corner"];
 
-/** Whether a handle is a place of a body of its own. */
+/** Whether a handle is a body's own place. */
 const isPlace = ({ id, what, axes }: Handle) => PLACES.includes(what)
   || (ENDS.includes(what) && axes.every(({ part }) => part !== undefined)
     && /^(surface|conveyor|stream|sensor)/.test(id));
 
-/** What moves whole bodies by what one is grabbed at, m; null if none has a place of its own. */
+/** A handle that moves whole bodies, grabbed at a point, m; null if none has its own place. */
 function bodyOf(handles: Handle[], names: string[], x: number, y: number): Handle | null {
   const own = handles.filter((one) => names.includes(one.surface) && isPlace(one));
   if (!own.length) return null;
@@ -355,7 +355,7 @@ function bodyOf(handles: Handle[], names: string[], x: number, y: number): Handl
   };
 }
 
-/** The values of the scene that a handle's axes stand for, by key. */
+/** The values of the scene for a handle's axes, by key. */
 function valuesOf({ axes, values: own }: Handle, numbers: number[]): Record<string, unknown> {
   const values: Record<string, any> = {};
   const held = axes.map(({ low, high }, n) => Math.min(high, Math.max(low, numbers[n])));
@@ -368,7 +368,7 @@ function valuesOf({ axes, values: own }: Handle, numbers: number[]): Record<stri
   return values;
 }
 
-/** Round to a step, without the digits that rounding leaves. */
+/** Round to a step, without digits from rounding. */
 const roundTo = (
   value: number, step: number,
 ) => Number((Math.round(value / step) * step).toPrecision(12));

@@ -1,4 +1,4 @@
-// What can be typed: main numbers of the scene in a panel, and what is chosen in a card beside it.
+// Fields: main numbers of the scene in a panel, and the chosen part in a card beside it.
 
 import { roundUp } from "./chart.ts";
 import { MAIN, checked, fieldsOf, sectionsOf, showsFew, type Field, type Section } from "./controls.ts";
@@ -14,10 +14,10 @@ import type { Words } from "./words.ts";
 /** Places of a slider, and a range that is narrow enough for one. */
 const PLACES = 100, NARROW = 400;
 
-/** What is first to be changed of a plate on a hinge. */
+/** Keys shown first for a plate on a hinge. */
 const HUNG = ["spring", "damper", "angle_deg"];
 
-/** Keys that another one takes the place of. */
+/** Keys that are replaced by another one. */
 const INSTEAD: Record<string, string[]> = {
   opens_when: ["opens_at", "closes_when"], closes_when: ["closes_at", "opens_when"],
   opens_at: ["opens_when"], closes_at: ["closes_when"],
@@ -35,17 +35,17 @@ class Fields {
   home = html("div", { class: "fields" });
   entries: Map<string, Entry> = new Map();
   built = "";
-  /** The rest of what is shown: that of the next thing is open where this is. */
+  /** The "More" section; it stays open for the next thing. */
   more = html("details", {});
 
-  /** @param sliders whether numbers have one, too
-   * @param owned whether it is told whose they are */
+  /** @param sliders whether numbers have one
+   * @param owned whether owners of fields are named */
   constructor(
     readonly lab: Lab, readonly words: Words, readonly sliders: boolean,
     readonly owned: boolean = !sliders,
   ) {}
 
-  /** @param isFirst which are not under "More" */
+  /** @param isFirst whether a field is not under "More" */
   show(fields: Field[], isFirst: (field: Field) => boolean) {
     const built = JSON.stringify(fields.map(({ key, choices }) => [key, choices]));
     if (built !== this.built) this.build(fields, isFirst);
@@ -108,7 +108,7 @@ class Fields {
     return row;
   }
 
-  /** The range of a number, up to twice its value where the key has no range; and a step. */
+  /** The range of a number, up to twice its value if the key has no range; and a step. */
   rangeOf({ low, high, value, table, name }: Field) {
     const wide = high - low > NARROW, top = wide ? 2 * (Math.abs(value) || 0.5) : high;
     const ten = 10 ** Math.floor(Math.log10(top)), end = Math.ceil(top / ten) * ten;
@@ -126,7 +126,7 @@ class Fields {
       const click = () => {
         const its = this.entries.get(key)?.field ?? field, { step, whole } = this.rangeOf(its);
         const by = its.unit === "degrees" || whole ? 1 : roundUp(step);
-        // From between two round values to the next of them.
+        // From a value between two round ones go to the next of them.
         const at = way * Math.floor((way * its.value) / by + 1e-9), next = (at + way) * by;
         const value = Math.min(high, Math.max(low, Number(next.toPrecision(12))));
         lab.asked = "";
@@ -153,13 +153,13 @@ class Fields {
     return slider;
   }
 
-  /** Let a slider go over the range of a number. */
+  /** Set a slider to the range of a number. */
   span(slider: HTMLInputElement, field: Field) {
     const { from, to, step } = this.rangeOf(field);
     Object.assign(slider, { min: from, max: to, step });
   }
 
-  /** Show the value that counts, and why one that was typed does not. */
+  /** Show the present value, and why a typed one is refused. */
   fill(field: Field) {
     const { lab, words } = this, its = this.entries.get(field.key);
     if (!its) return;
@@ -200,10 +200,10 @@ class Fields {
     return Array.isArray(value[0]) ? value.map(row).join("; ") : row(value);
   }
 
-  /** Told of the new name of what is shown. */
+  /** Called with the new name of the thing shown. */
   renamed: (name: string) => void = () => {};
 
-  /** m that are large in the picture; set by what knows it. */
+  /** m that look large in the picture; set from outside. */
   unit = () => 1;
 
   /** The field in which something was typed. */
@@ -214,7 +214,7 @@ class Fields {
     const { lab, words } = this, its = this.entries.get(key);
     if (!its) return;
     const { field, input } = its;
-    // What was only looked at keeps all its digits.
+    // A value that was not changed keeps all its digits.
     if (typeof typed === "string" && typed.trim() === this.text(field)) {
       if (lab.asked === key && lab.fault) this.giveUp(key);
       return;
@@ -238,7 +238,7 @@ class Fields {
       } else if (field.name === "motor") {
         lab.change({ [key]: value ? { speed_deg: 90, torque: 1 } : undefined });
       } else {
-        // What cannot be given beside it goes.
+        // Remove keys that contradict it.
         const row = key.slice(0, key.indexOf(".") + 1);
         const alone = value === undefined || value === true || field.table === "pin";
         const others = alone ? [] : INSTEAD[field.name] ?? [];
@@ -251,7 +251,7 @@ class Fields {
     }
   }
 
-  /** Back to the value that counts. */
+  /** Go back to the present value. */
   giveUp(key: string) {
     const { lab } = this, its = this.entries.get(key);
     lab.asked = "";
@@ -262,7 +262,7 @@ class Fields {
 }
 
 class Inspector {
-  /** The names of what is chosen. */
+  /** The names of the chosen parts. */
   parts: string[] = [];
   listeners: (() => void)[] = [];
   choice;
@@ -297,7 +297,7 @@ class Inspector {
     this.refresh();
   }
 
-  /** The name of what is chosen last; "scene" of all where nothing is. */
+  /** The name of the part chosen last; "scene" if none is. */
   get part() {
     return this.parts.at(-1) ?? "scene";
   }
@@ -309,7 +309,7 @@ class Inspector {
     this.listeners.forEach((listener) => listener());
   }
 
-  /** Make a material, or what a pair has, and choose it. */
+  /** Make a material or a pair, and choose it. */
   make(table: "material" | "pair") {
     const { lab } = this, { given, machine, scene, data } = lab;
     if (!given || !scene) return;
@@ -321,10 +321,10 @@ class Inspector {
     this.choose(`${table} ${rows.at(-1)?.name ?? rows.length}`);
   }
 
-  /** What copies are made by; set by what knows where to put them. */
+  /** Makes copies; set from outside. */
   duplicate = () => {};
 
-  /** Whether all that is chosen can be deleted. */
+  /** Whether all chosen parts can be deleted. */
   get canDelete() {
     const { given } = this.lab;
     return given !== undefined && this.parts.length > 0
@@ -341,10 +341,10 @@ class Inspector {
     document.getElementById("picture")?.focus();
   }
 
-  /** The part of the palette that a thing is. */
+  /** The palette's part of a thing. */
   kindOf({ table, row }: Section): Part | undefined {
     const { given, data, scene } = this.lab, own = listOf(given?.[table])[row] ?? {};
-    // A box is told by what it consists of.
+    // A box is recognised by its particles.
     const { size } = table === "stream" && scene ? scene.particles[scene.kinds[row]] : {} as Given;
     const keys: Given = size ? { size, ...own } : own;
     const fits = data.parts.filter((part: Part) =>
@@ -369,7 +369,7 @@ class Inspector {
     const section = all.find(({ name }) => name === this.part && name !== "scene");
     const kind = section && this.kindOf(section);
     const stream = section?.table === "stream" ? scene.kinds[section.row] : -1;
-    // A stream is shown with what it consists of.
+    // A stream is shown with its kind of particles.
     const grain = all.filter(({ table }) => table === "particle")[stream];
     const fields = !section || this.parts.length > 1 ? []
       : [section, ...(grain ? [grain] : [])].flatMap((one) => fieldsOf(data, given, scene, one));
@@ -391,7 +391,7 @@ class Inspector {
     this.buttons.duplicate.hidden = !this.mayDelete || !rowsNamed(given, this.parts).length;
   }
 
-  /** Set where nothing may be taken away. */
+  /** Whether parts may be deleted. */
   mayDelete = true;
 
   names: string | undefined;

@@ -88,8 +88,7 @@ function withKind(
   return [{ ...given, particle: [...kinds, { ...made, name, material: wanted }] }, name];
 }
 
-/** For each particle the name of its stream and its number there, which stay when streams change.
- */
+/** For each particle the name of its stream and its number there, which do not change. */
 const calledOf = (given: Given) => rowsOf(given, "stream").flatMap(({ name, count = 1 }, n) =>
   Array.from({ length: count }, (_, k) => `${k} ${name ?? (n ? `stream${n + 1}` : "stream")}`));
 
@@ -146,7 +145,8 @@ function withJoint(
     ({ ...one, interact: true })) }, part.table, row);
 }
 
-/** A scene with a line that disappears when a surface is touched, which is made if necessary.
+/** A scene with a line that disappears when a surface is touched; a surface is made if there is
+ * none.
  * @param points its ends, and one of that surface, m */
 function withTrigger(
   given: Given, part: Part, [from, to, [x, y]]: Point[], unit: number,

@@ -8,20 +8,20 @@ import type { View } from "./view.ts";
 /** px; radius of the dot of a fixed end, of a pin, and widths of lines. */
 const DOT = 3, PIN = 4.5, THIN = 1.4, THICK = 3.2;
 
-/** Of a spring's length at rest: half of its width. */
+/** Half of a spring's width, as a share of its length at rest. */
 const COIL = 0.05;
 
-/** Shares of a spring's way at which it turns to and fro. */
+/** Shares of a spring's length at which its zigzag turns. */
 const TURNS = Array.from({ length: 13 }, (_, n) => n / 12);
 
-/** Names of all joints: kind and number, as of tables whose rows have none. */
+/** Names of all joints: kind and number, as for tables whose rows have no names. */
 export function namesOfJoints({ joints }: Machine) {
   return joints.map(({ kind }, n) =>
     `${kind} ${joints.slice(0, n + 1).filter((one) => one.kind === kind).length}`);
 }
 
-/** Where the ways of a joint begin and end at a time, s and m, and how long they are; none while
- * one of its particles is not there. Over a pulley a string has two, each as slack as the other. */
+/** Ends and lengths of the parts of a joint at a time, s and m; none while one of its particles is
+ * not under way. Over a pulley a string has two parts, equally slack. */
 function waysOfJoint(
   { kind, particle, other, from, length }: Tied, { tracks }: Recording, t: number,
 ) {
@@ -37,7 +37,7 @@ function waysOfJoint(
     ({ from, to: [x, y], length: (length + legs[n] - legs[1 - n]) / 2 }));
 }
 
-/** Joints as lines at a time, s, but for pins. */
+/** Joints as lines at a time, s, except pins. */
 export function linesOfJoints(recording: Recording, t: number) {
   const names = namesOfJoints(recording.machine);
   return recording.machine.joints.flatMap((joint, n) => (joint.kind === "pin" ? []
@@ -53,7 +53,7 @@ export function pinsOf(recording: Recording, t: number) {
     (joint.kind === "pin" ? [{ name: names[n], at: pinAt(joint, recording, t) }] : []));
 }
 
-/** Where a pin is at a time, m: it turns with its particle. */
+/** Place of a pin at a time, m: it turns with its particle. */
 function pinAt({ particle, from }: Tied, { tracks, machine }: Recording, t: number): Point {
   const state = tracks[particle].state(t), [x, y] = from as Point;
   if (!state) return [x, y];
@@ -87,8 +87,8 @@ export function paintJoints(
         });
         continue;
       }
-      // Pulled along gravity at its middle it would be twice as deep there: a curve whose middle
-      // is at half of what its control point is.
+      // Pulled along gravity at its middle it would be twice as deep there; the middle of the curve
+      // is at half the depth of its control point.
       const sag = kind === "string" ? Math.sqrt(Math.max(length * length - far * far, 0)) : 0;
       const [across, up] = recording.machine.up;
       line.quadraticCurveTo(view.px(u + dx / 2 - across * sag), view.py(v + dy / 2 - up * sag),

@@ -1,5 +1,5 @@
-// From what a student types to a reply: as Python's `exercises/judging.py`, but that what is typed
-// is text, with a point or a comma, and perhaps with its unit.
+// Replies to typed answers: like Python's `exercises/judging.py`, but answers are text, with a
+// point or a comma, and perhaps with a unit.
 
 import { fixedText, scientific } from "./decimal.ts";
 import {
@@ -12,10 +12,10 @@ export type Reply = { verdict: Verdict, text: string, mistake: string };
 /** Relative difference up to which rounding, or another g, is the likely reason. */
 const CLOSE_BY = 0.05;
 
-/** Ratio from which on a percentage says less than a factor. */
+/** From this ratio on a factor is clearer than a percentage. */
 const FAR_OFF = 10;
 
-/** Characters of what was typed that are shown back. */
+/** Most characters of the typed text that a reply quotes. */
 const LONGEST_SHOWN = 40;
 
 const TYPED_NUMBER = new RegExp([
@@ -26,11 +26,11 @@ const TYPED_NUMBER = new RegExp([
 
 const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻";
 
-/** What degrees are called where they are typed along. */
+/** Words for degrees that may be typed. */
 const DEGREES_TYPED = ["°", "deg", "degree", "degrees", "grad"];
 
-/** The number that was typed, null for nothing, or what to say instead.
- * @param unit that is asked for */
+/** The typed number, null for nothing, or advice in words.
+ * @param unit asked for */
 function readTyped(typed: string, unit: string): number | null | { why: string, text: string } {
   const text = typed.trim();
   if (/^[.?…_\s-]*$/.test(text)) return null;
@@ -49,7 +49,7 @@ function readTyped(typed: string, unit: string): number | null | { why: string, 
   return Number.isFinite(value) ? value : { why: "infinite", text: shown };
 }
 
-/** Whether an answer stands for a number. */
+/** Whether an answer counts as a number. */
 const isClose = (
   answer: number, number: number,
 ) => Math.abs(answer - number) <= TOLERANCE * Math.abs(number);
@@ -70,8 +70,7 @@ const withUnit = (
 
 /** Judge a finite answer: right, a known mistake, right for another student, two mistakes at once,
  * or off.
- * @param others names and
- *   right answers of others; looked at only if need be */
+ * @param others names and right answers of others; used only if needed */
 function judge(its: Case, answer: number, others: Iterable<[string, number]> = []): Reply {
   const { right, numbers: { exercise }, question: { unit } } = its;
   const mistaken = (mistake: string, text: string) =>
@@ -89,7 +88,7 @@ function judge(its: Case, answer: number, others: Iterable<[string, number]> = [
       return mistaken(worded(exercise, "mistake-others"), worded(exercise, "reply-others", { name }));
     }
   }
-  // What is close has hardly two mistakes in it, and what two pairs lead to tells of neither.
+  // A close answer hardly has two mistakes, and if two pairs lead to it, neither is named.
   const pairs = its.pairs.filter(({ number }) => isClose(answer, number));
   if (pairs.length === 1 && Math.abs(answer / right - 1) > CLOSE_BY) {
     return mistaken(pairs[0].called, pairs[0].says);

@@ -1,4 +1,4 @@
-// What one takes along: a link, the scene, the picture, tables; and the address that follows.
+// Things to take along: a link, the scene, the picture, tables; and the address with the changes.
 
 import { toToml } from "./keys.ts";
 import { pictureOf } from "./film.ts";
@@ -23,7 +23,7 @@ class Keep {
     this.said = html("p", { class: "note", role: "status" });
     const button = (id: string, click: () => void, reveals = false) =>
       html("button", { class: reveals ? "reveals" : "", click }, words.say(id));
-    // In a lesson the step says which machine it is.
+    // In a lesson the step defines the machine.
     const { lesson } = lab.data, hasAddress = !lesson && /^(https?|file):$/.test(location.protocol);
     const head = (id: string) => (lesson ? [] : [html("p", {}, words.say(id))]);
     const take = hasAddress ? [...head("share-link"), html("div", { class: "row" },
@@ -70,7 +70,7 @@ class Keep {
       })];
   }
 
-  /** Take over the scene of the address, if it can be. */
+  /** Take over the scene of the address, if it is valid. */
   open() {
     const { lab } = this, { hash } = location;
     if (hash === this.hash || (hash.length < 2 && !this.hash)) return;
@@ -84,7 +84,7 @@ class Keep {
 
   told: object | undefined;
 
-  /** What was changed and let go is in the address, and told to a page that this one is part of. */
+  /** Finished changes go into the address, and are reported to a page around this one. */
   follow() {
     const { lab } = this, { given } = lab;
     if (!given || lab.before || this.told === given) return;
@@ -95,12 +95,12 @@ class Keep {
     if (!lab.data.lesson) try {
       history.replaceState(null, "", this.hash || location.href.replace(/#.*/s, ""));
     } catch {
-      // A page without an address of its own, such as a frame's text, has none to change.
+      // A page without its own address, such as a frame's text, has none to change.
     }
     if (parent !== window) parent.postMessage({ chutelab: "scene", toml: this.toml }, "*");
   }
 
-  /** What shows this machine within another page. */
+  /** HTML that shows this machine within another page. */
   get frame() {
     const { href, protocol } = location, frame = html("iframe", {
       // A page beside this one finds it by its name.
@@ -126,7 +126,7 @@ class Keep {
   }
 
   table(name: string, rows: (string | number)[][]) {
-    // The mark tells spreadsheets that it is Unicode.
+    // The mark shows spreadsheets that it is Unicode.
     this.save(`${name}.csv`, `\ufeff${toCsv(rows, this.comma.checked)}`, "text/csv");
   }
 

@@ -1,4 +1,4 @@
-// Keys of the whole page, and the list that tells them.
+// Keys of the whole page, and the list of them.
 
 import { html } from "./panels.ts";
 import type { Bench } from "./bench.ts";
@@ -7,7 +7,7 @@ import type { Marks } from "./marks.ts";
 import type { Palette } from "./palette.ts";
 import type { Words } from "./words.ts";
 
-/** What keys do, in words of the catalogue: `help-` and these. */
+/** Functions of keys, in words of the catalogue: `help-` and these. */
 const KEYS: [string, string][] = [
   ["play", "help-space"], ["step", "← →"], ["mark", ", ."], ["ends", "Home End"], ["tab", "Tab"],
   ["handle", "← → ↑ ↓"], ["fine", "help-shift"], ["undo", "help-ctrl-z"], ["redo", "help-ctrl-shift-z"],
@@ -17,7 +17,7 @@ const KEYS: [string, string][] = [
   ["alt", "Alt"], ["escape", "help-esc"], ["zoom", "+ −"], ["help", "?"],
 ];
 
-/** Elements that have a use of their own for keys. */
+/** Elements with their own use of keys. */
 const BUSY = "button, input, select, textarea, summary, a, dialog, [role=slider]";
 
 function listenToKeys(
@@ -32,7 +32,7 @@ function listenToKeys(
   document.body.append(dialog);
   const help = () => {
     dialog.showModal();
-    // The button at its end has the focus.
+    // The button at the end of the list has the focus.
     dialog.scrollTop = 0;
   };
   document.getElementById("keys")?.addEventListener("click", help);
@@ -50,7 +50,7 @@ function listenToKeys(
     "+": () => click("tool-zoom-in"), "-": () => click("tool-zoom-out"),
     "?": help, ",": () => marks.jump(-1), ".": () => marks.jump(1),
   };
-  // Letters count while the picture has the focus.
+  // Letters act while the picture has the focus.
   const drawn: Record<string, () => void> = {
     v: () => bench.set(null), "ctrl+c": () => bench.copy(), "ctrl+v": () => bench.paste(),
     "ctrl+d": () => bench.duplicate(), "ctrl+a": () => bench.all(),

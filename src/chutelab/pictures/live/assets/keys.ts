@@ -17,7 +17,7 @@ function partsOf(given: Given, key: string): (string | number)[] {
   } else if (rows !== undefined && !Array.isArray(rows) && parts[1] === 0) {
     parts.splice(1, 1);
   }
-  // The page has every line as points.
+  // The page stores every line as points.
   const { points } = (rows as any)?.[parts[1]] ?? {};
   if (parts[0] === "surface" && points && (parts[2] === "from" || parts[2] === "to")) {
     parts.splice(2, 1, "points", parts[2] === "from" ? 0 : points.length - 1);
@@ -29,14 +29,14 @@ function partsOf(given: Given, key: string): (string | number)[] {
 export const indexed = (given: Given, key: string) => partsOf(given, key)
   .map((part, n) => (typeof part === "number" ? `[${part}]` : n ? `.${part}` : part)).join("");
 
-/** Returns what is written at a full path; undefined if nothing is. */
+/** Returns the value at a full path; undefined if there is none. */
 export function valueAt(given: Given, key: string): any {
   let found: any = given;
   for (const part of partsOf(given, key)) found = found?.[part];
   return found;
 }
 
-/** Returns keys with other values by full path; undefined takes a key away. */
+/** Returns keys with other values by full path; undefined removes a key. */
 export function withValues(given: Given, values: Record<string, any>): Given {
   const changed = structuredClone(given);
   for (const [key, value] of Object.entries(values)) {
@@ -54,7 +54,7 @@ export function withValues(given: Given, values: Record<string, any>): Given {
 function tomlValue(value: any): string {
   if (Array.isArray(value)) return `[${value.map(tomlValue).join(", ")}]`;
   if (typeof value === "string") {
-    // JSON leaves one control character as it is, which TOML does not allow.
+    // JSON does not escape one control character that TOML does not allow.
     return JSON.stringify(value).replaceAll("\x7f", "\\u007f");
   }
   if (typeof value === "number") return Object.is(value, -0) ? "-0.0" : String(value);
@@ -64,13 +64,13 @@ function tomlValue(value: any): string {
 }
 
 function tomlLine(key: string, value: any): string {
-  // A seed beyond 2**53 is text here, for no number of JavaScript has its digits.
+  // A seed beyond 2**53 is text here, as numbers of JavaScript do not have its digits.
   const whole = key === "seed" && typeof value === "string";
   const name = /^[\w-]+$/.test(key) ? key : tomlValue(key);
   return `${name} = ${whole ? value : tomlValue(value)}`;
 }
 
-/** Returns the text of a scene file, without what was promised for another scene. */
+/** Returns the text of a scene file, without expectations, which belong to another scene. */
 export function toToml(given: Given) {
   const lines = [];
   const isTable = (value: any) => {

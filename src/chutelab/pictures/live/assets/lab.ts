@@ -1,4 +1,4 @@
-// The scene as it is changed: its values, its run, its clock. Nothing here draws.
+// The scene being changed: its values, its run, its clock. Nothing here draws.
 
 import { runOf } from "./breaches.ts";
 import { roundUp } from "./chart.ts";
@@ -11,37 +11,37 @@ import { Fault, resolve, type Scene, type Given } from "./scene.ts";
 import type { Engine } from "./engine.ts";
 import type { Given as Pull, Push } from "./worker.ts";
 
-/** A particle, or what hangs on a hinge and where, m from there while it has not turned */
+/** A particle, or a hinged surface and the place on it, m from the hinge before it has turned */
 export type Held = { disk: number } | { surface: number, grip: [number, number] };
 
 export type News = "scene" | "run" | "time" | "play";
 
-/** s of a crowd that is computed before it is shown. */
+/** s of a crowd's run that are computed before it is shown. */
 const AHEAD = 0.5;
 
-/** Undo reaches back so many changes. */
+/** Most changes that can be undone. */
 const MOST_UNDO = 200;
 
 /** Slow motion and fast, in times of real time. */
 const RATES = [0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 4];
 
-/** Of a machine without particles yet, which no file can be: one far away, to build it with. */
+/** A particle far away, to build a machine without particles, which no file may be. */
 const NOWHERE = { at: [9e5, 9e5], velocity: [0, 0] };
 
-/** 1/s², 1/s; by how much a hand hastens what it holds for each metre that it is away, and slows it
- * down for each m/s: it comes there as fast as it can without swinging. */
+/** 1/s², 1/s; acceleration of a held thing per metre of distance from the hand, and deceleration
+ * per m/s: it comes there as fast as possible without swinging. */
 const STIFF = 355, SLOWS = 2 * Math.sqrt(STIFF);
 
-/** m²; what is held nearer to its hinge is turned as if it were held there. */
+/** m²; a surface held nearer to its hinge is turned as if held at this distance squared. */
 const NEAR_HINGE = 1e-6;
 
 /** Whether a scene has no particles. */
 const isBare = ({ stream }: Given) => Array.isArray(stream) && !stream.length;
 
-/** Keys that no engine looks at. */
+/** Keys that engines ignore. */
 const UNSEEN = ["title", "sensor", "view"];
 
-/** Whether two scenes differ, but not in what is run. */
+/** Whether two scenes differ only in keys that engines ignore. */
 function isSameRun(one: Given, other: Given) {
   const told = (given: Given, without: string[]) => JSON.stringify(
     Object.entries(given).filter(([key]) => !without.includes(key)));
@@ -56,21 +56,20 @@ class Lab {
   t = 0;
   playing = false;
   rate = 1;
-  /** Length of a bin of the loads of surfaces, s, where the scene says none; 0: none are counted.
-   */
+  /** Width of bins of loads, s, if the scene has none; 0: no loads. */
   loads = 0;
   fault: Fault | null = null;
-  /** The key whose field says what is wrong; "" where the page says it. */
+  /** The key whose field shows the fault; "" if the page shows it. */
   asked = "";
-  /** What undo goes back to once what is dragged is let go. */
+  /** State for undo once a dragged part is released. */
   before: Given | undefined = undefined;
   given?: Given;
   scene?: Scene;
   machine?: Machine;
   recording?: Recording;
-  /** What is held by hand, and where that is, m. */
+  /** The thing held by hand, and the hand's place, m. */
   hand: (Held & { to: [number, number] }) | null = null;
-  /** What was done by hand in this run; and the machine in which particles do not meet. */
+  /** Pushes by hand in this run; and the machine in which particles do not meet. */
   pushes: Push[] = [];
   loose: Machine | null = null;
   /** Whether the engine waits for the hand. */
@@ -96,8 +95,7 @@ class Lab {
     this.listeners.get(news)?.forEach((listener) => listener());
   }
 
-  /** Take over a scene that can be built, and run it; one that cannot changes nothing but
-   * `fault`. */
+  /** Take over a scene that can be built, and run it; another one only sets `fault`. */
   use(given: Given): boolean {
     try {
       const scene = resolve(isBare(given) ? { ...given, stream: NOWHERE } : given, this.data);
@@ -109,8 +107,8 @@ class Lab {
           machine[key] = [];
         }
       }
-      // In a lesson a run is one machine's from its beginning, so that it can be noted.
-      // What moves does so by the run's time, which a change does not begin anew.
+      // In a lesson a run belongs to one machine from its beginning, so that it can be noted.
+      // Surfaces move by the time of the run, which a change does not restart.
       const goesOn = !this.data.lesson && this.machine?.interact && machine.interact && this.t > 0
         && ![machine, this.machine].some(({ movers, triggers }) =>
           movers.length || triggers.length);
@@ -134,15 +132,15 @@ class Lab {
     return isTaken;
   }
 
-  /** Say why something cannot be; all stays as it is. */
+  /** Report why something is not possible; nothing changes. */
   refuse(fault: Fault) {
     this.fault = fault;
     this.tell("scene");
   }
 
-  /** Run from a time on, with what is there then: a crowd goes on while it is changed, all
-   * others begin anew, since they take no time, and what has joints, which are tied at the
-   * release.
+  /** Run from a time on, with the particles present then: a crowd goes on while it is changed.
+   * Others start again, since their runs take no time, as do scenes with joints, which are tied at
+   * the release.
    * @param since s */
   run(since: number) {
     const machine = this.machine = this.loose ?? this.machine as Machine;
@@ -162,14 +160,14 @@ class Lab {
     this.engine.run(job, AHEAD + (from > 0 ? 0 : this.t), (chunk) => {
       recording.add(chunk);
       this.tellSoon();
-      // After a change a track may well lie where a surface is now.
-      // What is dragged is judged where it is let go.
+      // After a change a track may lie where a surface is now. A dragged part is judged where it is
+      // released.
       if (recording.state === "done" && !recording.renamed && !this.before) this.judge(recording);
     });
   }
 
-  /** Catch something of the run that is shown, and go on by hand from there: as Python's
-   * `chutelab.start` all go on together, step by step. */
+  /** Catch something in the run shown, and go on by hand from there: like Python's
+   * `chutelab.start`, with all particles together, step by step. */
   grab(held: Held, to: [number, number]) {
     const { machine, t } = this, pushes = this.pushes.filter(({ due }) => due <= t);
     if (!machine) return;
@@ -193,13 +191,13 @@ class Lab {
     }, pushes);
   }
 
-  /** Let go of what is held. */
+  /** Release the held thing. */
   drop() {
     this.hand = null;
     this.allow(0);
   }
 
-  /** Draw what is held to the hand for so many seconds. */
+  /** Pull the held thing to the hand for so many seconds. */
   draw(seconds: number) {
     const { recording, machine, hand } = this;
     if (!this.waits || !recording || !machine || !hand) return;
@@ -217,8 +215,8 @@ class Lab {
     this.engine.push(push);
   }
 
-  /** The force of the hand on what it holds, m (k (to - x) - c v), and its weight; of what hangs on
-   * a hinge their torque, with the mass that it has where it is held. */
+  /** The hand's force on the held thing, m (k (to - x) - c v), plus its weight; for a hinged
+   * surface the torque, with its effective mass at the place held. */
   pullOn(hand: Held & { to: [number, number] }, recording: Recording, machine: Machine):
     Pull | null {
     const { to } = hand, { now } = recording, { up, gravity, mass } = machine;
@@ -240,7 +238,7 @@ class Lab {
       - v * pull(0, pivot[0] + u, -rate * v)) - weightOf(mover, angle, machine) };
   }
 
-  /** Find the laws that a run breaks, which is over. */
+  /** Find the laws that a finished run breaks. */
   judge(recording: Recording) {
     this.engine.judge(runOf(recording), (breaches) => {
       recording.breaches = breaches;
@@ -248,7 +246,7 @@ class Lab {
     });
   }
 
-  /** Tell of the run: at once of one that is over, else once a frame, since a crowd sends more
+  /** Report the run: at once if it is finished, else once per frame, since a crowd sends more
    * often. */
   tellSoon() {
     if (this.recording?.state === "done") this.tell("run");
@@ -266,8 +264,8 @@ class Lab {
 
   waiting = false;
 
-  /** Change values of the scene, by key. While something is dragged they are no step of undo
-   * yet. */
+  /** Change values of the scene, by key. While something is dragged they are not yet a step of
+   * undo. */
   change(values: Record<string, unknown>, { done = true }: { done?: boolean } = {}) {
     const given = this.given as Given, changed = withValues(given, values);
     const counts = Object.keys(values).some((key) => /^stream.*count$/.test(key));
@@ -281,7 +279,7 @@ class Lab {
     if (done) this.settle();
   }
 
-  /** What was dragged is let go: make one step of undo of it. */
+  /** The dragged part is released: make the drag one step of undo. */
   settle() {
     if (this.before && this.before !== this.given) {
       this.past = [...this.past, this.before].slice(-MOST_UNDO);
@@ -308,25 +306,25 @@ class Lab {
     this.use(given);
   }
 
-  /** Back to the scene as it was written, which can be undone. */
+  /** Go back to the original scene, which can be undone. */
   reset() {
     if (this.given !== this.first) this.replace(this.first);
     this.restart();
   }
 
-  /** All again from the beginning, with the machine as it is now. */
+  /** Start again from the beginning, with the present machine. */
   restart() {
     this.t = this.start;
     if (this.recording?.renamed || this.pushes.length) this.run(0);
     this.tell("time");
   }
 
-  /** When there is something to see, s. */
+  /** Beginning of the time bar, s: 0, or earlier if the recording begins earlier. */
   get start() {
     return Math.min(0, this.recording?.begin ?? 0);
   }
 
-  /** s up to which time may go: the end of the run, or as far as it has come. */
+  /** Latest time that can be shown, s: the end of the run, or as far as it has come. */
   get end() {
     const { recording } = this;
     if (!recording) return 0;
@@ -334,8 +332,8 @@ class Lab {
       ? recording.now : Math.max(recording.end, 0);
   }
 
-  /** s up to which the time may go at most, as far as that is known: of a run that is under way a
-   * round time beyond what is computed. */
+  /** End of the time bar, s: the end of the run if known, else a round time beyond what is
+   * computed. */
   get horizon() {
     const { recording, end } = this;
     if (recording?.state !== "running" || !recording.machine.interact) return end;
@@ -370,14 +368,14 @@ class Lab {
     this.tell("time");
   }
 
-  /** Let the run go on so far that so many seconds can be shown at once.
+  /** Compute the run so far that so many seconds can be shown.
    * @param seconds of real time */
   allow(seconds: number) {
     const since = this.t - (this.recording?.shift ?? 0);
     this.engine.allow(since + (seconds + AHEAD) * Math.max(1, this.rate));
   }
 
-  /** Go on by a frame of so many seconds of real time. */
+  /** Advance by a frame of so many seconds of real time. */
   tick(seconds: number) {
     if (!this.playing) return;
     if (this.hand) {

@@ -1,5 +1,5 @@
-// Where the particles of a stream arrive on the outgoing belt: a histogram, and the mean of the
-// first n with its error.
+// Arrivals of a stream on the outgoing belt: a histogram, and the mean of the first n with its
+// error.
 
 import { Chart, onWidth, rangeOf, roundUp } from "./chart.ts";
 import { countUntil } from "./crowd.ts";
@@ -14,8 +14,8 @@ type Histogram = { from: number, width: number, counts: number[] };
 /** Points of a running mean that are drawn at most. */
 const MOST_POINTS = 300;
 
-/** How often values lie in bins of a round width, √n of them or a few more or less.
- * @param of those that the bins are made for */
+/** Counts of values in bins of a round width, about √n bins.
+ * @param of values for which the bins are chosen */
 function histogram(values: number[], of: number[] = values): Histogram {
   const [low, high] = rangeOf(of, 0);
   // All may land at one place.
@@ -94,7 +94,7 @@ class LandingPanel {
       .filter((i) => i % Math.ceil(running.length / MOST_POINTS) === 0 || i === running.length - 1);
     const sides = [1, -1].map((sign) => some.filter((i) => isFinite(running[i].error))
       .map((i) => [i + 1, running[i].mean + sign * running[i].error]));
-    // The first few are far off, and are not to make all the others flat.
+    // The first few are far off, and must not make all the others look flat.
     const few = Math.min(5, 0.5 * running.length);
     const seen = sides.flat().filter(([n]) => n > few).map(([, x]) => x);
     this.means.frame([0, Math.max(2, running.length)], rangeOf(seen), { below: "n", beside: "x / m" });
@@ -107,7 +107,7 @@ class LandingPanel {
     this.fill();
   }
 
-  /** What has arrived up to now. */
+  /** Arrivals up to the present time. */
   fill() {
     const { arrivals, words, all } = this;
     if (this.panel.hidden || !all || !arrivals.length) return;
@@ -117,9 +117,9 @@ class LandingPanel {
     }
     this.filled.setAttribute("d", this.bars.bars(all.from, all.width, counts));
     this.means.point(n || NaN);
-    // Before the first one arrives the whole is told.
+    // Before the first arrival show the whole run.
     const which = n || arrivals.length, { mean, error } = this.running[which - 1];
-    // Both with the same places; below a nanometre is rounding.
+    // Both with the same number of decimals; less than a nanometre is rounding.
     const places = error > 1e-9 ? Math.max(3, 1 - Math.floor(Math.log10(error))) : 3;
     this.result.textContent = words.say(isFinite(error) ? "landing-result" : "landing-first", {
       n: which, mean: words.fixed(mean, places), error: words.fixed(error, places),

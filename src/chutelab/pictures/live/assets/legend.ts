@@ -1,20 +1,20 @@
-// The legend in the picture: which colour stands for which speed, size or stream.
+// The legend in the picture: colours of speeds, sizes or streams.
 
 import { freePlace } from "./callout.ts";
 import { STEPS } from "./balls.ts";
 import { svg } from "./scenery.ts";
 import type { Stage } from "./stage.ts";
 
-/** Width of the ramp and height of one of its steps, px: the height that is tried first, and one
- * for less room; from one line of text to the next; and width of a letter, about. */
+/** Width of the ramp and height of one of its steps, px: the height tried first, and one for less
+ * room; distance of lines of text; and width of a letter, about. */
 const WIDE = 14, TALL = [19, 12], LINE = 22, LETTER = 8.5;
 
-/** Radius of a stream's dot, and from its left side to the text, px. */
+/** Radius of a stream's dot, and distance from its left side to the text, px. */
 const DOT = 7, BESIDE = 3 * DOT;
 
 class Legend {
   layer = svg("g", { class: "hues" });
-  /** What it was drawn of last. */
+  /** State that was drawn last. */
   drawn = "";
 
   constructor(readonly stage: Stage) {
@@ -23,7 +23,7 @@ class Legend {
     stage.drawers.unshift(() => this.draw());
   }
 
-  /** What its lines say, from the top: with the step of colour that it is beside, or a stream. */
+  /** Its lines from the top, each with a step of colour or a stream. */
   get lines(): [number, string][] {
     const { balls, lab: { machine }, words } = this.stage;
     if (balls.hue === "kind") {
@@ -43,7 +43,7 @@ class Legend {
     const notes = lines.length && stage.isLarger ? [words.say("drawn-larger")] : [];
     const now = JSON.stringify([lines, balls.hue, notes, x, y, scale, width, height, stage.scaleAt,
       lab.recording?.state]);
-    // Under what is dragged it stays.
+    // It stays in place during a drag.
     if (held || now === this.drawn) return;
     this.drawn = now;
     layer.replaceChildren();
@@ -74,7 +74,7 @@ class Legend {
       break;
     }
     if (!stage.legend) this.flat(title, lines);
-    // Where a machine fills all of a small picture, it makes room.
+    // If a machine fills all of a small picture, make room.
     if (!stage.legend && !stage.strip && !stage.moved) {
       stage.keepFree(LINE);
       return;
@@ -83,7 +83,7 @@ class Legend {
     layer.setAttribute("aria-label", `${title}: ${lines.map(([, text]) => text).join(", ")}`);
   }
 
-  /** Find room for so much, px, or in the strip that is kept free; its upper left corner. */
+  /** Find room for a size, px, or use the strip kept free; the upper left corner. */
   find(wide: number, high: number): [number, number] {
     const { stage } = this, { view: { free }, strip, corner: [x], moved } = stage;
     const inStrip: [number, number] | null = high <= strip && !moved ? [x, free.top] : null;
@@ -94,7 +94,7 @@ class Legend {
     return [left, bottom - high];
   }
 
-  /** All in a line, where there is little room. */
+  /** Everything in one line, if there is little room. */
   flat(title: string, lines: [number, string][]) {
     if (this.stage.balls.hue === "kind") {
       const long = (text: string) => LETTER * text.length;

@@ -1,6 +1,5 @@
-// A lesson in the page, one step at a time: what is asked, what may be changed, what is noted, and
-// what becomes of it. What a pupil does is kept in this browser under the name, or by the page
-// that this one is part of.
+// A lesson in the page, one step at a time: questions, keys that may be changed, notes, and
+// replies. A pupil's work is kept in this browser under the name, or by the page around this one.
 
 import { Questions, isInWords } from "./exercise.ts";
 import { plainName, type Exercise } from "./draw.ts";
@@ -17,27 +16,27 @@ import type { Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
 
-/** Texts are HTML that Python made of Markdown; `right` counts from 1 */
+/** Texts are HTML made by Python from Markdown; `right` counts from 1 */
 export type Ask = { text: string, mark: string | null, choices: string[], replies: string[],
   right: number | null, sketch: boolean };
 type Step = Wanted & { kind: "predict" | "try" | "note" | "explain" | "numbers", text: string,
   controls: string[], asks: Ask[], then: string };
 export type LessonData = { name: string, title: string, question: string, steps: Step[] };
-/** Where a pupil is: the step, those that are done, what was said to each ask, what was noted. */
+/** A pupil's progress: present step, finished steps, answers to questions, noted runs. */
 type Kept = { at: number, done: number[], said: Record<string, any>,
   runs: Record<string, Noted[]> };
 
-/** Panels that can be opened beside a step that lets one look. */
+/** Panels that can be opened beside a step in which the run may be seen. */
 const PANELS = ["energy", "numbers", "landing", "flow", "curves", "share"];
 
-/** Characters of what a platform is given to keep. */
+/** Most characters of the data that a platform keeps. */
 const MOST_KEPT = 4000;
 
-/** What is nearer than that is right, m. */
+/** A mark within this distance is right, m. */
 const NEAR = 0.05;
 
-/** Hands of a class for each of some choices, which a teacher counts on the projector, with bars as
- * long as their shares. Nothing of it is kept. */
+/** Hands of a class for each choice, which a teacher counts on the projector, with bars for their
+ * shares. Nothing of it is kept. */
 function votesOf(choices: string[], words: Words): HTMLElement[] {
   const counts = choices.map(() => 0);
   const rows = choices.map((choice, n) => {
@@ -60,12 +59,12 @@ function votesOf(choices: string[], words: Words): HTMLElement[] {
   return rows;
 }
 
-/** What this browser keeps between two visits, if it does. */
+/** The browser's storage between two visits, if it has any. */
 function store(which: "localStorage" | "sessionStorage"): Storage | null {
   try {
     return globalThis[which];
   } catch {
-    // A frame without an origin has none.
+    // A frame without an origin has no storage.
     return null;
   }
 }
@@ -97,9 +96,9 @@ class Lesson {
   kept: Kept = { at: 0, done: [], said: {}, runs: {} };
   student = "";
   task: Task | undefined;
-  /** Whether another page said who this is, and keeps what becomes of it. */
+  /** Whether a page around this one gave the name, and keeps the work. */
   isHosted = false;
-  /** What the step has put into the picture. */
+  /** Elements that the step has put into the picture. */
   tools: { remove: () => void }[] = [];
   flag: Flag | null = null;
   runs: Runs | null = null;
@@ -159,17 +158,17 @@ class Lesson {
     addEventListener("focus", () => this.catchUp());
   }
 
-  /** Name all steps where there is room, else the present one. */
+  /** Show names of all steps if there is room, else only of the present one. */
   fitSteps() {
     const { list, nav } = this;
     list.classList.remove("many");
     list.classList.toggle("many", list.offsetWidth > nav.offsetWidth);
   }
 
-  /** What was last read or written of what is kept. */
+  /** Kept data as last read or written. */
   known: string | null | undefined;
 
-  /** Go on from where the pupil got in another tab meanwhile. */
+  /** Go on from the pupil's progress in another tab. */
   catchUp() {
     if (this.student && !this.isHosted && this.stored !== this.known) this.begin(this.student);
   }
@@ -182,7 +181,7 @@ class Lesson {
     return this.lesson.steps[this.kept.at];
   }
 
-  /** Be told who this is by a page around this one, which keeps what becomes of it. */
+  /** Get the name from a page around this one, which keeps the work. */
   listen() {
     if (parent === window) return;
     addEventListener("message", ({ source, data }) => {
@@ -195,7 +194,7 @@ class Lesson {
     parent.postMessage({ chutelab: "ready", lesson: this.lesson.name }, "*");
   }
 
-  /** The first page: what it is about, and who this is. */
+  /** The first page: the subject, and the pupil's name. */
   welcome() {
     const { words, lesson } = this;
     this.clear();
@@ -222,7 +221,7 @@ class Lesson {
     document.title = lesson.title;
   }
 
-  /** Whose page this is, on the button for somebody else. */
+  /** The pupil's name, on the button for somebody else. */
   name() {
     this.who.title = [this.student, this.words.say("somebody-else")].filter(Boolean).join(": ");
     this.who.setAttribute("aria-label", this.who.title);
@@ -235,8 +234,8 @@ class Lesson {
     document.getElementById("student")?.focus();
   }
 
-  /** Go on from where a pupil got; without a name nothing is kept.
-   * @param suspended what `suspend_data` was */
+  /** Go on from a pupil's progress; without a name nothing is kept.
+   * @param suspended earlier `suspend_data` */
   begin(student: string, suspended?: string) {
     this.student = student.trim().slice(0, LONGEST_NAME);
     const text = this.isHosted ? suspended
@@ -274,14 +273,14 @@ class Lesson {
       .filter((name) => typeof name === "string");
   }
 
-  /** The last step that can be opened: none is beyond a prediction that is not made. */
+  /** The last step that can be opened: none after a missing prediction. */
   get reach() {
     const { steps } = this.lesson;
     const open = steps.findIndex(({ kind }, n) => kind === "predict" && !this.kept.done.includes(n));
     return open < 0 ? steps.length - 1 : open;
   }
 
-  /** Take away what a step has put into the page. */
+  /** Remove what a step has put into the page. */
   clear() {
     for (const tool of this.tools.splice(0)) tool.remove();
     this.flag = this.runs = null;
@@ -295,7 +294,7 @@ class Lesson {
     const { lab } = this, key = JSON.stringify(set);
     lab.data.live = { ...lab.data.live, predict: true,
       controls: controls.map((one) => indexed(lab.first, one)) };
-    // A step about the same machine leaves it as it is.
+    // A step about the same machine keeps its present state.
     if (key !== this.machine || !controls.length) {
       lab.use(Object.keys(set).length ? withValues(lab.first, set) : lab.first);
     }
@@ -358,7 +357,7 @@ class Lesson {
     const nodes = grown(text);
     for (const node of nodes) {
       if (!(node instanceof Element)) continue;
-      // It scrolls by itself where it is too wide, with the keyboard, too.
+      // It scrolls by itself if it is too wide, also with the keyboard.
       if (node.matches("table")) node.setAttribute("tabindex", "0");
       for (const place of node.querySelectorAll("[data-key]")) {
         place.replaceWith(this.values.scrub(place.getAttribute("data-key") ?? ""));
@@ -367,8 +366,7 @@ class Lesson {
     return nodes;
   }
 
-  /** What was expected at the predictions before a step, and in a step that explains what becomes
-   * of it. */
+  /** The predictions before a step, and in a step with an explanation the replies to them. */
   expected(n: number): Node[] {
     const { words, kept, lesson: { steps } } = this, { kind } = steps[n];
     if (!["try", "note", "explain"].includes(kind)) return [];
@@ -400,7 +398,7 @@ class Lesson {
       ...told.flatMap((one, k) => (k ? ["; ", one] : [one])))];
   }
 
-  /** Show what was put or drawn into the picture, beside the run. */
+  /** Show marks and sketches in the picture, beside the run. */
   draw({ mark, sketch }: Ask, value: any) {
     const { stage, lab, words } = this, none = () => {};
     if (!Array.isArray(value) || (!mark && !sketch)) return;
@@ -433,7 +431,7 @@ class Lesson {
       !choices.length && !mark && !sketch)).length;
   }
 
-  /** What a step asks. */
+  /** The questions of a step. */
   asked(n: number): Node[] {
     return this.lesson.steps[n].asks.map((ask, k) => {
       const id = `${n}.${k}`, name = `ask-${n}-${k}`, { words, kept } = this;
@@ -504,7 +502,7 @@ class Lesson {
     return [this.runs.wait, this.runs.root];
   }
 
-  /** The questions with numbers of one's own, for those who have a name. */
+  /** The exercise with the student's own numbers, if there is a name. */
   exercise(): Node[] {
     const { task, lab, words, step } = this;
     if (step.kind !== "numbers" || !lab.data.exercise) return [];
@@ -518,12 +516,12 @@ class Lesson {
     }).root];
   }
 
-  /** Whether the run may be seen: on the projector it is the class that answers. */
+  /** Whether the run may be seen; on the projector it is the class that answers. */
   get isReady() {
     return this.isAnswered || document.documentElement.matches(".projector");
   }
 
-  /** Whether all that a step asks is answered. */
+  /** Whether all questions of a step are answered. */
   get isAnswered() {
     const { at, said } = this.kept;
     return this.step.asks.every((_, k) => said[`${at}.${k}`] !== undefined);
@@ -541,7 +539,7 @@ class Lesson {
     return true;
   }
 
-  /** What was predicted counts, and the run can be seen. */
+  /** The prediction is final, and the run can be seen. */
   commit() {
     const { at, done } = this.kept;
     if (!done.includes(at)) done.push(at);
@@ -556,7 +554,7 @@ class Lesson {
     this.keep();
   }
 
-  /** Something has changed: what is done, what is said of it, and where one can go. */
+  /** Something has changed: update finished steps, replies, and navigation. */
   look() {
     const { kept, lab, words, sheet } = this, { at } = kept, { kind } = this.step;
     if (sheet.classList.contains("start")) return;
@@ -607,8 +605,8 @@ class Lesson {
     });
   }
 
-  /** Say what becomes of each answer, as soon as that may be said: of a choice that predicts when
-   * it is explained. */
+  /** Show the reply to each answer as soon as it may be shown: for a prediction in the explanation.
+   */
   tellReplies() {
     const { kept: { at, said }, words, step } = this;
     for (const place of this.page.querySelectorAll(".reply[data-ask]")) {
@@ -635,7 +633,7 @@ class Lesson {
 
   told = "";
 
-  /** Keep what was done, and tell the platform that keeps the score. */
+  /** Keep the work, and report it to the platform that keeps the score. */
   keep() {
     const { task, kept, student, isHosted, lesson } = this;
     const words = lesson.steps.flatMap((step, n) => (isInWords(step)
@@ -643,7 +641,7 @@ class Lesson {
         ? kept.said[`${n}.${k}`] : [])) : []));
     if (task && words.length) task.explained = words.join("\n\n").slice(0, LONGEST_WORDS);
     const result: any = task?.result ?? { chutelab_steps: 1, lesson: lesson.name, student };
-    // The words are among what was said.
+    // The words are among the answers.
     const rest = { ...result, ...(words.length ? { words: undefined } : {}) };
     const many = lesson.steps.length;
     let suspended = JSON.stringify({ ...rest, steps: kept });
@@ -655,7 +653,7 @@ class Lesson {
         const runs = name === "runs" ? {} : kept.runs;
         suspended = JSON.stringify({ ...rest, steps: { ...kept, said, runs } });
       }
-      // What is no news is not told.
+      // Unchanged data are not reported.
       if (suspended === this.told) return;
       this.told = suspended;
       const progress = task?.progress ?? { lesson: lesson.name, student, done: kept.done.length,
@@ -668,12 +666,12 @@ class Lesson {
     try {
       store("localStorage")?.setItem(this.place(plainName(student)), suspended);
     } catch {
-      // It is full: what is typed is there all the same, until the page is left.
+      // The storage is full; typed answers stay until the page is left.
     }
     this.known = this.stored;
   }
 
-  /** What this browser keeps of the pupil. */
+  /** The pupil's data in this browser. */
   get stored() {
     return store("localStorage")?.getItem(this.place(plainName(this.student)));
   }

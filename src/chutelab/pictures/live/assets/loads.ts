@@ -1,5 +1,5 @@
-// What surfaces bear: the mean force on each in bins of time, as arrows in the picture and as a
-// table; what Python's `results/loads.py` tells.
+// Loads on surfaces: the mean force on each in bins of time, as arrows in the picture and as a
+// table; like Python's `results/loads.py`.
 
 import { drawArrows } from "./arrows.ts";
 import { LOAD_ROW } from "./core.ts";
@@ -9,14 +9,14 @@ import type { Recording } from "./recording.ts";
 import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
 
-/** Length of a bin where the scene says none, s; and px of the largest force. */
+/** Default width of a bin, s; and length of the largest force, px. */
 const EVERY = 0.02, LARGEST = 80;
 
-/** N, and where in m; a mean is of the bins from the first to the last with a load. */
+/** N, and place in m; means are over the bins from the first to the last with a load. */
 export type Load = { name: string, now: number, mean: number, peak: number, force: number[],
   place: number[] };
 
-/** What each surface bears that bears anything; `now` in the bin of a time, s. */
+/** The loads of each loaded surface; `now` is in the bin of a time, s. */
 function loadsOf({ machine, loads, shift }: Recording, t: number): Load[] {
   const { surfaces, loads: every } = machine, wide = surfaces.length * LOAD_ROW;
   const bins = wide ? loads.length / wide : 0, bin = Math.floor((t - shift) / every + 1e-9);
@@ -59,7 +59,7 @@ class LoadsPanel {
     stage.painters.push((context) => this.paint(context));
   }
 
-  /** Count them, or no more; the run begins anew. */
+  /** Record loads, or no longer; the run starts again. */
   show(on: boolean) {
     const { lab } = this, { machine, scene } = lab;
     lab.loads = on ? scene?.run.loads ?? EVERY : 0;

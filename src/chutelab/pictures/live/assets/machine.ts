@@ -17,7 +17,7 @@ export interface Segment {
   surface: number; // index of the surface it belongs to
   appears: number; // s
   vanishes: number; // s
-  one_sided: number; // solid on its left, of an arc outside, if 1, there not if -1; 0: on both
+  one_sided: number; // 1: solid on the left only (arc: outside); -1: on the other side; 0: on both
   restitution: number[]; // by kind of particles
   friction: number[];
   ends: [number, number, number, number]; // x and y of both, m
@@ -47,21 +47,21 @@ interface Pulley {
   friction: number[];
 }
 
-/** What a surface does when another one is touched for the first time */
+/** Action of a surface when another one is touched for the first time */
 export interface Trigger {
   surface: number;
   doing: "opens" | "closes" | "starts";
   by: number; // the surface that is touched
 }
 
-/** A joint with its numbers, m, N/m and N s/m; `other` is -1 where it has a fixed end */
+/** A joint with its numbers, m, N/m and N s/m; `other` is -1 if it has a fixed end */
 export type Tied = Pick<Joint, "kind" | "particle" | "from"> & { other: number, length: number,
   stiffness: number, damper: number };
 
 export interface Machine {
   surfaces: string[]; // names
   gravity: number;
-  tilt: number; // rad; by which gravity is turned from straight down
+  tilt: number; // rad; angle of gravity from straight down
   up: [number, number]; // against gravity
   air: number; // kg/m³, density of still air; 0 without
   landing: number; // index of the outgoing belt, -1 without one
@@ -69,24 +69,24 @@ export interface Machine {
   endTime: number; // s
   dt: number; // s
   interact: boolean;
-  loads: number; // s; how long a bin of the loads of surfaces is, 0 if they are not counted
+  loads: number; // s; width of the bins of loads, 0 without loads
   segments: Segment[];
   arcs: Arc[];
   movers: Mover[];
   triggers: Trigger[];
   joints: Tied[];
   pulley: Pulley | null;
-  streams: string[]; // what tells them apart: names, or which of those without
+  streams: string[]; // their names, or numbers of those without
   releases: Release[];
   radius: number[]; // of each particle, m
   mass: number[]; // kg
   inertia: number[]; // kg m²
-  outlines: Point[][]; // by kind: corners of boxes and polygons, m; none of what is round
+  outlines: Point[][]; // by kind: corners of boxes and polygons, m; empty if round
   pairRestitution: number[][]; // of two kinds
   pairFriction: number[][];
-  cohesion: number[][]; // N; by which each kind pulls at each kind, and at each surface
+  cohesion: number[][]; // N; cohesion of each kind with each kind, and with each surface
   rolling: number[]; // by kind
-  falls: number[]; // s/m; 1 over the speed up to which restitution is what it is
+  falls: number[]; // s/m; inverse of the speed up to which restitution is constant
 }
 
 /**
@@ -118,7 +118,7 @@ export function build(scene: Scene): Machine {
   const bound = last + run.max_time;
   const tilt = scene.gravity_deg * RADIANS, [sin, cos] = sinCos(tilt);
   const pairs = every.map((a) => every.map((b) => met(scene, a, b)));
-  // Boxes run all at a time; those that never meet pass by.
+  // Boxes all run at once, even if they do not interact.
   const outlines = particles.map(({ outline }) => outline);
   const isAlone = !scene.crowded && outlines.some(({ length }) => length);
   return waiting({
@@ -158,10 +158,10 @@ export function build(scene: Scene): Machine {
   });
 }
 
-/** Restitution of two kinds that pass through each other. */
+/** Restitution that marks two kinds that pass through each other. */
 export const PASSES = -1.0;
 
-/** Sets the times at which what waits for a touch acts, s; Infinity of what still waits. */
+/** Sets the times of triggers, s; Infinity for those that have not acted. */
 export function actAt({ triggers, segments, arcs, movers }: Machine, times: number[]) {
   triggers.forEach(({ surface, doing }, n) => {
     const own = <T extends { surface: number }>(all: T[]) =>
@@ -180,12 +180,10 @@ export function waiting(machine: Machine): Machine {
   return machine;
 }
 
-/** rad/s; shortest times of hinges are at least 1 over it: steps have to be shorter. */
+/** rad/s; the shortest time of a hinge is at least its inverse, as steps have to be shorter. */
 const SWIFTEST = 1e5;
 
-/**
- * @throws {Fault} if what hangs on a hinge has an inertia that no mass has, or is too stiff
- */
+/** @throws {Fault} if a hinged surface has an impossible inertia, or is too stiff */
 function weigh({ inertia, mass, moment: [x, y], spring, damper }: Mover, name: string) {
   if (!inertia) return;
   const least = mass > 0 ? (x * x + y * y) / mass : 0;
@@ -195,10 +193,10 @@ function weigh({ inertia, mass, moment: [x, y], spring, damper }: Mover, name: s
   if (inertia < stiff) throw new Fault(key, inertia, "stiff", { least: stiff });
 }
 
-/** Share of its length by which a string may be too short: that is rounding. */
+/** Share of its length by which a string may be too short, by rounding. */
 const TAUT = 1e-9;
 
-/** m; a string or a rod is at least so long. */
+/** m; least length of a string or rod. */
 const NEAR = 1e-9;
 
 /**
@@ -226,7 +224,7 @@ function joined({ joints }: Scene, releases: Release[]): Machine["joints"] {
   });
 }
 
-/** The corners of a particle that is at a place and has turned, m; none of what is round. */
+/** The corners of a particle at a place and angle, m; none if it is round. */
 export function cornersOf(
   { outlines, releases }: Machine, i: number, { x, y }: { x: number, y: number }, angle: number,
 ): Point[] {
@@ -235,7 +233,7 @@ export function cornersOf(
     [x + c * u - s * v, y + s * u + c * v]);
 }
 
-/** Tells whether a place is inside convex corners, counterclockwise. */
+/** Whether a place is inside convex corners, counterclockwise. */
 export const isInside = (corners: Point[], [x, y]: Point) => corners.every(([a, b], n) => {
   const [u, v] = corners[(n + 1) % corners.length];
   return (u - a) * (y - b) - (v - b) * (x - a) >= 0;
@@ -251,7 +249,7 @@ function surfaceNames({ incoming, plates, outgoing, conveyor, surface }: Scene) 
   ];
 }
 
-/** Returns mass and moment of inertia of each particle: with the cube and the fifth power of
+/** Returns mass and moment of inertia of each particle, proportional to the cube and fifth power of
  * size. */
 function heft(scene: Scene, releases: Release[], radius: number[]) {
   const mass = [];

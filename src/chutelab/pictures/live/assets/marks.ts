@@ -1,4 +1,4 @@
-// What happens in a run, as marks on the bar of the time: separations, impacts, landings, gates.
+// Events of a run as marks on the time bar: separations, impacts, landings, gates.
 
 import { onWidth } from "./chart.ts";
 import { FEWEST } from "./crowd.ts";
@@ -11,7 +11,7 @@ import type { Words } from "./words.ts";
 
 type Happening = { t: number, kind: string, name?: string };
 
-/** Kinds of events of the core that are marked, with their icons. */
+/** Kinds of the core's events that are marked, with their icons. */
 const KINDS: Record<number, string> = {
   1: "separation", 3: "impact", 4: "landing", 5: "collision", 7: "settle",
 };
@@ -20,17 +20,17 @@ const ICONS: Record<string, string> = {
   opens: "gate", closes: "gate", starts: "play",
 };
 
-/** Pixels from one mark to the next at least, and happenings that one mark tells at most. */
+/** Least distance of marks, pixels, and most events of one mark. */
 const APART = 26, TOLD = 3;
 
-/** Where there is no room for fingers they are ticks that only tell where something happens, and
- * pixels between these. */
+/** If there is no room for fingers, marks are ticks without function; least distance of ticks,
+ * pixels. */
 const FINE = matchMedia("(min-width: 720px) and (pointer: fine)"), TICKS = 5;
 
-/** s by which a time that is shown may miss what happens then. */
+/** s by which the time shown may differ from an event's. */
 const THEN = 1e-9;
 
-/** When the gates of a machine open and close, and what waits for that begins to move. */
+/** Times at which gates of a machine open and close, and triggered motions begin. */
 function gatesOf({ segments, arcs, movers, surfaces }: Machine): Happening[] {
   const gates = new Map([...segments, ...arcs].map((one) => [one.surface, one]));
   const starts = movers.filter(({ begins }) => begins > 0 && isFinite(begins))
@@ -44,12 +44,12 @@ function gatesOf({ segments, arcs, movers, surfaces }: Machine): Happening[] {
 
 class Marks {
   root;
-  /** All that happens, and the marks that tell it. */
+  /** All events, and their marks. */
   all: Happening[] = [];
   shown: { button: HTMLElement, first: number, last: number }[] = [];
   wide = 400;
   drawn = "";
-  /** Events of the run, how many of them have been read, and what was found in them. */
+  /** Events of the run, the number read, and the marks found. */
   read = { events: [] as Event[], many: 0, found: [] as Happening[], down: false };
 
   constructor(readonly lab: Lab, readonly stage: Stage, readonly words: Words) {
@@ -71,8 +71,8 @@ class Marks {
     });
   }
 
-  /** By time what happens to the first particle of a few, the first landing of a crowd, and
-   * gates. */
+  /** By time: the events of the first particle of a few, the first landing of a crowd, and gates.
+   */
   get happenings(): Happening[] {
     const { recording, machine } = this.lab;
     if (!recording || !machine || !isFinite(recording.begin)) return [];
@@ -90,7 +90,7 @@ class Marks {
     return [...gatesOf(machine), ...read.found].sort((a, b) => a.t - b.t);
   }
 
-  /** What happens, in words. */
+  /** An event in words. */
   tell({ t, kind, name = "" }: Happening) {
     const { words } = this;
     return `${words.say(`mark-${kind}`, { name: words.name(name) })}, ${words.fixed(t, 3)} s`;
@@ -98,7 +98,7 @@ class Marks {
 
   draw() {
     const { lab, root, wide } = this, span = lab.horizon - lab.start;
-    // Nothing of a run that is to be predicted is in the page.
+    // A run that is to be predicted has no marks.
     this.all = this.stage.blind || !(span > 0) ? [] : this.happenings;
     const { matches: fine } = FINE, now = JSON.stringify([this.all, lab.start, span, wide, fine]);
     if (now === this.drawn) return;
@@ -131,14 +131,14 @@ class Marks {
     this.lab.seek(t);
   }
 
-  /** Go to what happens next, or before. */
+  /** Go to the next event, or the previous one. */
   jump(way: number) {
     const { t } = this.lab, far = (one: Happening) => way * (one.t - t);
     const there = this.all.filter((one) => far(one) > THEN);
     if (there.length) this.go(there.reduce((a, b) => (far(b) < far(a) ? b : a)).t);
   }
 
-  /** Tell what has happened from what is still to come, and what happens now. */
+  /** Distinguish past, present and coming events. */
   mark() {
     const { lab: { t, playing }, shown } = this;
     const done = shown.filter(({ first }) => first <= t + THEN).length;
@@ -152,14 +152,14 @@ class Marks {
     });
   }
 
-  /** What happens at the time that is shown, in words. */
+  /** The event at the time shown, in words. */
   get saysNow() {
     const { t } = this.lab;
     const now = this.all.filter((one) => Math.abs(one.t - t) < THEN).map((one) => this.tell(one));
     return now.join("; ");
   }
 
-  /** How many have happened, and which is shown, as it was told last. */
+  /** Number of past events, and the one shown, as displayed last. */
   marked = "";
 }
 

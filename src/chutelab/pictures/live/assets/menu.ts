@@ -5,12 +5,12 @@ import type { Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
 
-/** As the system has it, or always one of both; and for which media the dark colours are then. */
+/** The system's theme, or always one of both; with the media for the dark colours. */
 const THEMES: Record<string, string> = {
   system: "screen and (prefers-color-scheme: dark)", light: "not all", dark: "screen",
 };
 
-/** The theme that this browser keeps, if it keeps anything. */
+/** The theme kept in this browser, if it keeps anything. */
 const kept = {
   get theme() {
     try {
@@ -49,7 +49,7 @@ class Menu {
     this.dark = [...document.styleSheets[0].cssRules].find((rule): rule is CSSMediaRule =>
       rule instanceof CSSMediaRule && rule.conditionText.includes("prefers-color-scheme"));
     const { theme } = kept;
-    // It is as the system has it: to say so again has all of it styled and painted once more.
+    // It is the system's theme; setting it again would style and paint everything once more.
     if (theme in THEMES && theme !== "system") this.paint(theme);
     else this.press("system");
   }
@@ -59,7 +59,7 @@ class Menu {
       html("span", {}, this.words.say(id)));
   }
 
-  /** An empty machine, which can be undone. */
+  /** Start an empty machine, which can be undone. */
   empty() {
     this.lab.replace({ title: this.words.say("new-machine"), stream: [] });
     this.stage.fit();

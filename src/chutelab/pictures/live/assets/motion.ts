@@ -1,17 +1,17 @@
-// Where what moves is: what `Mover` in `machine/parts.py` is in Python. The core has its own.
+// Places of moving surfaces, like Python's `Mover` in `machine/parts.py`. The core has its own.
 
 import type { Arc, Machine, Segment } from "./machine.ts";
 import type { Mover } from "./plan.ts";
 import type { Point } from "./scene.ts";
 
-/** Of the pivot, m, and how far it has turned, rad */
+/** Pivot, m, and angle, rad */
 export type Pose = { x: number, y: number, turn: number };
-/** States of hinges as the core tells them: t (s), angle (rad), rate (rad/s); what stops and damper
- * took and pushes gave so far (J); surface. */
+/** States of hinges from the core: t (s), angle (rad), rate (rad/s); losses at stops and in the
+ * damper and work of pushes so far (J); surface. */
 export const SWING_ROW = 7;
 
-/** J: kinetic energy, that of the weight from the hinge's height, the spring's; and what stops and
- * damper took and pushes gave so far */
+/** J: kinetic energy, potential energy above the hinge, spring energy; losses at stops and in the
+ * damper and work of pushes so far */
 export type Hung = { kinetic: number, potential: number, spring: number, restitution_loss: number,
   damper_loss: number, push_work: number };
 
@@ -19,7 +19,7 @@ export type Hung = { kinetic: number, potential: number, spring: number, restitu
 class Swings {
   rows: number[][] = [];
 
-  /** The states before and after a time, and which share of the way between them it is. */
+  /** The states before and after a time, and the share of the interval that has passed. */
   around(t: number): [number[], number[], number] {
     const { rows } = this;
     let low = 0, high = rows.length - 1;
@@ -33,8 +33,8 @@ class Swings {
       h > 0 ? Math.min(1, Math.max(0, (t - rows[low][0]) / h)) : 1];
   }
 
-  /** Energies and work at a time, as `Hinge.energies` has them in Python: straight between states,
-   * so that what closes at both closes between them. */
+  /** Energies and work at a time, like Python's `Hinge.energies`: linear between states, so that a
+   * ledger that closes at both closes between them. */
   energies(
     t: number, { inertia, moment: [x, y], spring, rest }: Mover, { gravity, up }: Machine,
   ): Hung {
@@ -60,14 +60,14 @@ class Swings {
   }
 }
 
-/** The torque of a hinge's weight where it has turned by an angle, N m. */
+/** The torque of a hinge's weight at an angle, N m. */
 export function weightOf({ moment: [x, y] }: Mover, angle: number, { gravity, up }: Machine) {
   const [c, s] = [Math.cos(angle), Math.sin(angle)];
   return gravity * (up[0] * (x * s + y * c) - up[1] * (x * c - y * s));
 }
 
-/** Where a mover is at a time, s. It travels with an even acceleration up to the middle, and the
- * same against it from there on. */
+/** The pose of a mover at a time, s. It travels with a constant acceleration up to the middle, and
+ * with the opposite one from there on. */
 function poseOf(mover: Mover, time: number, swings?: Swings): Pose {
   const { pivot, by, frequency, phase, way, from, lasts, turn, inertia, begins } = mover;
   const t = Math.max(time - begins, 0);
@@ -78,7 +78,7 @@ function poseOf(mover: Mover, time: number, swings?: Swings): Pose {
   return { x, y, turn: inertia ? swings?.at(time) ?? 0 : turn * t };
 }
 
-/** Where a pose carries a place, m, as written. */
+/** Position of a point, given as written, m, in a pose. */
 function carried({ x, y, turn }: Pose, { pivot }: Mover, [px, py]: Point): Point {
   const [c, s, u, v] = [Math.cos(turn), Math.sin(turn), px - pivot[0], py - pivot[1]];
   return [x + c * u - s * v, y + s * u + c * v];
@@ -96,7 +96,7 @@ const onArc = (one: Arc, mover: Mover, pose: Pose): Arc => {
   return { ...one, x, y, begin: one.begin + pose.turn };
 };
 
-/** A machine as it is at a time, s; one in which nothing moves is itself.
+/** A machine at a time, s; the same object if nothing moves.
  * @param swings of hinges, by their surfaces */
 function posed(machine: Machine, t: number, swings?: Map<number, Swings>): Machine {
   if (!machine.movers.length) return machine;

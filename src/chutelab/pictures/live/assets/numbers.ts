@@ -1,5 +1,5 @@
-// The numbers of a transfer by the paper's symbols: as simulated, beside the closed form. Of a
-// crowd first those of the crowd, and of particle 0 if asked for.
+// The numbers of a transfer by the paper's symbols: simulated values beside the closed form. For a
+// crowd first the crowd's numbers, and those of particle 0 on request.
 
 import { FEWEST, crowdOf, type CrowdNumbers } from "./crowd.ts";
 import { card, follow, html } from "./panels.ts";
@@ -14,14 +14,14 @@ import type { Words } from "./words.ts";
 /** By the name of the quantity; its symbol and unit are in the page's data. */
 type Row = { id: string, simulated: number, analytic: number };
 
-/** What is told, as far as it happened. */
+/** Values shown, if they happened. */
 const SHOWN = ["phi1_deg", "v1", "t2", "x2", "v2", "v2r", "t3", "x3", "v3", "y3", "d3", "landing.x",
   "flight.t"];
 
-/** What is below this is rounding, in any of the units. */
+/** Smaller values are rounding, in any unit. */
 const ROUNDED = 1e-12;
 
-/** Without the last digits: where a value is halfway, both columns are to round it the same way. */
+/** Without the last digits, so that both columns round an exact half the same way. */
 const tidy = (value: number) => Number(value.toPrecision(11));
 
 function mean(values: number[]) {
@@ -34,20 +34,20 @@ function mean(values: number[]) {
   return sum / many;
 }
 
-/** Each number as the mean over all particles that have it, and as predicted; NaN where there is
- * none.
+/** Each number as the mean over all particles that have it, and its prediction; NaN without one.
  * @param found those of `predict`
- * @param pulley its radius, m @param radius of each particle, m */
+ * @param pulley its radius, m
+ * @param radius of each particle, m */
 function numbersOf(
   stages: Stages[], found: Record<string, number>, pulley: number, radius: number[],
 ): Row[] {
-  // What leaves a wall or a hopper has not left a pulley.
+  // A particle that leaves a wall or a hopper has not left a pulley.
   if (!isFinite(pulley)) stages = stages.map(({ hit, down }) => ({ hit, down }));
   const none = { mass: NaN, angle: NaN, beltSpeed: NaN, rate: NaN };
   const each = stages.map((its, i) => ({
     ...symbolsOf(its, { ...none, pulley, radius: radius[i] }),
     "landing.x": its.down?.x ?? NaN,
-    // With a plate between, t2 and t3 say it.
+    // With a plate, t2 and t3 have it.
     "flight.t": its.left && its.down && !its.hit ? its.down.t - its.left.t : NaN,
   }) as Record<string, number>);
   const { phi1, x2, x3 } = found;

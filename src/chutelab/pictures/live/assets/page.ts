@@ -1,4 +1,4 @@
-// What every page has: reads its data, starts the engine's thread, and joins the parts.
+// The base of every page: reads its data, starts the engine's thread, and joins the parts.
 
 import { Bench } from "./bench.ts";
 import { watchLaws } from "./breaches.ts";
@@ -30,7 +30,7 @@ type Parts = { lab: Lab, stage: Stage, words: Words, bench: Bench, inspector: In
 
 const byId = (id: string): any => document.getElementById(id);
 
-/** @param join makes what only a sandbox has, or only a lesson */
+/** @param join adds the parts of only a sandbox, or only a lesson */
 async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?: object,
   sensors?: object, tools?: object }) {
   const { data, core, newThread, thread } = (globalThis as any).booted;
@@ -60,7 +60,7 @@ async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?
   const newEngine = (own = newThread()) => new Engine(own, module, data.layout);
   const lab = new Lab(data, newEngine(thread));
   const stage = new Stage(byId("stage"), lab, words);
-  // Of a crowd its numbers lead, and where it arrives.
+  // For a crowd its numbers and arrivals come first.
   const crowd = (lab.machine?.releases.length ?? 0) >= FEWEST && !data.lesson;
   const panels = (crowd ? [NumbersPanel, LandingPanel, EnergyPanel, CurvesPanel]
     : [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel])

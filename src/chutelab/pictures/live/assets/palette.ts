@@ -1,5 +1,5 @@
-// Parts to build a machine of, one for each row of their table; and what the page of an empty
-// machine says: how to begin, and examples.
+// Parts to build a machine from, one for each row of their table; and the introduction of an empty
+// page, with examples.
 
 import { Balls } from "./balls.ts";
 import { html, icon, iconButton } from "./panels.ts";
@@ -13,13 +13,13 @@ import { isBare, type Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
 
-/** Size of a picture of an example, px; and particles that it shows at most. */
+/** Size of a picture of an example, px; and most particles in it. */
 const WIDE = 176, HIGH = 104, MOST_BALLS = 400;
 
-/** Pixels that a finger moves before it drags a part instead of tapping it. */
+/** A finger that moves further than this, in pixels, drags a part instead of tapping it. */
 const STRAY = 8;
 
-/** What the first machine is, which a button makes. */
+/** The first machine, which a button makes. */
 const FIRST: Given = {
   particle: { radius: 0.02, material: "rubber", shape: "sphere", spin: true },
   incoming: { speed: 2, pulley_radius: 0.1, length: 0.8 },
@@ -31,7 +31,7 @@ const SKETCH = "M0 60H185A35 35 0 0 1 185 130H5M206 95A21 21 0 1 1 164 95A21 21 
 
 class Palette {
   panel;
-  /** What is drawn once the parts are seen. */
+  /** Drawn once the parts are visible. */
   due: (() => void)[] = [];
   opener;
   tiles: [Part, any][];
@@ -62,7 +62,7 @@ class Palette {
     this.open(false);
     lab.on("scene", () => this.refresh());
     this.refresh();
-    // Its letters count at once.
+    // Its letters act at once.
     if (!this.start || matchMedia("(pointer: coarse)").matches) return;
     stage.front.classList.add("quiet");
     stage.front.focus();
@@ -70,7 +70,7 @@ class Palette {
   }
 
   open(on: boolean) {
-    // What is chosen has its card where the parts are.
+    // The card of a chosen part is in the place of the parts.
     if (on && this.bench.inspector.parts.length) this.bench.inspector.choose();
     if (on) this.due.splice(0).forEach((draw) => draw());
     this.panel.hidden = !on;
@@ -82,8 +82,8 @@ class Palette {
     return this.tiles.find(([part]) => part.letter === letter.toUpperCase())?.[0];
   }
 
-  /** A part: pressed it is drawn in the picture, dragged it lies where it is let go, and with a
-   * finger or a key it lies in the middle. */
+  /** A part: a click begins to draw it in the picture, a drag puts it where it is dropped, and a
+   * finger or a key puts it in the middle. */
   tile(part: Part) {
     const { words, bench, stage } = this;
     const tile = html("button", { class: "tile", "aria-pressed": "false",
@@ -114,7 +114,7 @@ class Palette {
     return tile;
   }
 
-  /** What the next balls consist of. */
+  /** The material of the next balls. */
   materials() {
     const { words, bench, lab } = this, balls = new Balls(lab, () => "");
     const names = Object.keys(lab.data.presets).filter((name) => balls.isShaded(name));
@@ -134,7 +134,7 @@ class Palette {
       html("p", {}, words.say("ball-of")), html("div", {}, ...choices));
   }
 
-  /** How to begin, and examples; of a scene that is not shown whole, what is missing. */
+  /** Introduction and examples; for a scene that is not shown whole, the missing parts. */
   welcome(home: Element) {
     const { words, lab } = this, { data } = lab;
     if (data.lacks) {
@@ -183,7 +183,7 @@ class Palette {
     document.getElementById("play")?.focus();
   }
 
-  /** A small picture of a scene: what it consists of, and its first particles. */
+  /** A small picture of a scene: its surfaces, and its first particles. */
   picture(given: Given) {
     const drawn = svg("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, class: "thumb surfaces", "aria-hidden": "true" });
     const scene = resolve(given, this.lab.data), machine = build(scene), view = new View();
@@ -204,7 +204,7 @@ class Palette {
     return drawn;
   }
 
-  /** While nothing is there, the page says how to begin. */
+  /** While the scene is empty, the page says how to begin. */
   refresh() {
     const { given } = this.lab, { classList } = document.documentElement;
     const bare = Boolean(this.start) && Object.keys(given ?? {}).every((key) =>

@@ -1,9 +1,9 @@
-// What every panel beside the picture is made of: elements, a card, and when it is drawn again.
+// Base of every panel beside the picture: elements, a card, and redrawing.
 
 import { filled, svg } from "./scenery.ts";
 import type { Lab, News } from "./lab.ts";
 
-/** Of the time that passes, panels take at most one part in so many. */
+/** Panels take at most one part in so many of the time. */
 const SHARE = 12;
 
 const html = (
@@ -11,7 +11,7 @@ const html = (
 ): any => filled(document.createElement(name),
   { ...(name === "button" ? { type: "button" } : {}), ...attributes }, children);
 
-/** The nodes of a text that Python made of Markdown, where markup of its own is only text. */
+/** The nodes of a text made by Python from Markdown, in which raw markup is text. */
 function grown(markup: string): Node[] {
   const { body } = new DOMParser().parseFromString(markup, "text/html");
   return [...body.childNodes].map((node) => document.importNode(node, true));
@@ -22,14 +22,14 @@ function icon(name: string) {
   return svg("svg", { class: "i", "aria-hidden": "true" }, svg("use", { href: `#i-${name}` }));
 }
 
-/** A button with a drawing, and a name for those who point at it or hear it. */
+/** A button with a drawing, and a name for its tooltip and for screen readers. */
 function iconButton(
   id: string, drawing: string, name: string, click: () => void,
 ): HTMLButtonElement {
   return html("button", { class: "ib", id, title: name, "aria-label": name, click }, icon(drawing));
 }
 
-/** A button of the header that opens what lies in it, until one presses elsewhere. */
+/** A button of the header that opens its content, until one clicks elsewhere. */
 function menuOf(id: string, drawing: string, name: string, ...children: (string | Node)[]) {
   const head = html("summary", { class: "ib", title: name, "aria-label": name }, icon(drawing));
   const root = html("details", { class: "menu", id }, head,
@@ -62,24 +62,23 @@ function slide(input: HTMLInputElement, value: number) {
   style(input, "--at", `${(100 * share).toFixed(1)}%`);
 }
 
-/** Set a property of style; one that is so already is no work for the browser. */
+/** Set a property of style, unless it has that value, which saves the browser work. */
 function style(element: HTMLElement, name: string, value: string) {
   if (element.style.getPropertyValue(name) !== value) element.style.setProperty(name, value);
 }
 
-/** What takes longer, ms, is done alone in its frame. */
+/** Work that takes longer, ms, is done alone in its frame. */
 const HEAVY = 1.5, FRAME = 17;
 
-/** When something heavy may be done next, ms. */
+/** Time at which the next heavy work may be done, ms. */
 let alone = 0;
 
-/** ms from one time to the next at which a panel is drawn while the picture plays, or something is
- * dragged: what a browser then lays out and paints takes longer than to change it. */
+/** Interval at which a panel is drawn while the picture plays, or something is dragged, ms: layout
+ * and painting by the browser take longer than the change. */
 const CALM = 80;
 
-/** Do something whenever it is asked for, but if it takes long, later: the last call always
- * counts.
- * @param calm ms that are to pass at least until it is done again */
+/** Do something on request, but later if it takes long; the last call always counts.
+ * @param calm least time until it is done again, ms */
 function eased(act: () => void, calm = () => 0) {
   let free = 0, took = 0, waits = false;
   const ask = () => {
@@ -103,7 +102,7 @@ function eased(act: () => void, calm = () => 0) {
   return ask;
 }
 
-/** Draw a panel again at these news, as long as it is seen and there is a run to show. */
+/** Draw a panel again at these events, while it is visible and there is a run to show. */
 function follow(lab: Lab, panel: HTMLDetailsElement, news: News[], act: () => void) {
   const again = eased(() => {
     const isSeen = panel.open && !panel.matches(".off");
@@ -113,7 +112,7 @@ function follow(lab: Lab, panel: HTMLDetailsElement, news: News[], act: () => vo
   panel.addEventListener("toggle", again);
 }
 
-/** What stands before the title of a panel. */
+/** Text before the title of a panel. */
 const DRAWINGS: Record<string, string> = {
   edit: "slow", energy: "sum", numbers: "digits", landing: "bars", curves: "graph", share: "share",
   flow: "flow", loads: "land", sensors: "sensor",

@@ -1,5 +1,5 @@
-// A lesson on paper: its picture, then one step after the other with what was answered and noted,
-// and room to write where nothing was.
+// A lesson on paper: its picture, then one step after the other with answers and notes, or room to
+// write.
 
 import { grown, html } from "./panels.ts";
 import { tableOf } from "./runs.ts";
@@ -8,7 +8,7 @@ import type { Ask, Lesson } from "./lesson.ts";
 /** Lines to write on for an answer in words. */
 const LINES = 3;
 
-/** What was said, or lines for it. */
+/** The answer, or lines for it. */
 const written = (said: unknown, lines: number) => (typeof said === "string" && said.trim()
   ? [html("p", { class: "written" }, said)]
   : Array.from({ length: lines }, () => html("div", { class: "line" })));
@@ -28,7 +28,7 @@ function asked({ words, kept }: Lesson, ask: Ask, id: string) {
   return [question, ...written(said, LINES)];
 }
 
-/** The questions with numbers of one's own; without a name there are none. */
+/** The exercise with the student's own numbers; none without a name. */
 function numbers({ task, words }: Lesson) {
   if (!task) return [html("p", {}, words.say("name-note"))];
   return [
@@ -45,7 +45,7 @@ function numbers({ task, words }: Lesson) {
 /** Width of a page between its margins, px. */
 const WIDE = 680;
 
-/** The sheet, which has the picture while it is printed. */
+/** The sheet, which contains the picture during printing. */
 function paper(lesson: Lesson): HTMLElement {
   const { words, kept, student, stage, lesson: { title, question, steps } } = lesson;
   const picture = html("div", { class: "picture" }), { width, height } = stage.view;

@@ -5,10 +5,10 @@ import type { Bench } from "./bench.ts";
 import type { Palette } from "./palette.ts";
 import type { Words } from "./words.ts";
 
-/** What has no room for cards beside the picture, as in page.css. */
+/** Media without room for cards beside the picture, as in page.css. */
 const NARROW = "(max-width: 719px)";
 
-/** Of each drawer what lies in it: elsewhere on a wider page. */
+/** Content of each drawer, which is elsewhere on a wider page. */
 const DRAWERS: Record<string, string> = {
   tape: ".tools, .watch", eye: "#show .choices",
   more: "#restart, #back, #forward, #tool-hand, #fit, #tool-zoom-in, #tool-zoom-out, #sound, #film, #full, #language, #keys, #presets",
@@ -19,7 +19,7 @@ class Phone {
   tabs;
   dock;
   drawers: Record<string, any> = {};
-  /** What lies in a drawer on a phone, and what stands in its place meanwhile. */
+  /** Elements in drawers on a phone, and their placeholders. */
   lent: { node: any, mark: Comment, drawer: any }[] = [];
   buttons: Record<string, any> = {};
   /** The drawer that is open, and the card that is shown. */
@@ -65,7 +65,7 @@ class Phone {
     }
     panels.before(this.tabs, ...Object.values(this.drawers));
     document.body.append(this.dock);
-    // What was taken is to be seen in the picture.
+    // A chosen part should be visible in the picture.
     this.drawers.tape.addEventListener("click", ({ target }: MouseEvent) => {
       if ((target as Element).closest(".ib")) this.show("");
     });
@@ -87,7 +87,7 @@ class Phone {
       if (this.is.matches) drawer.append(node);
       else mark.after(node);
     }
-    // What scrolls is scrolled by keys, too.
+    // Scrolling elements can be scrolled by keys, too.
     const panels = document.getElementById("panels") as HTMLElement;
     if (this.is.matches) panels.tabIndex = 0;
     else panels.removeAttribute("tabindex");
@@ -113,7 +113,7 @@ class Phone {
     }
   }
 
-  /** The cards that can be shown: of what is chosen first. */
+  /** The cards that can be shown: that of the chosen part first. */
   get cards(): any[] {
     return [...document.querySelectorAll("#chosen, #panels > .card:not(#share)")]
       .filter((one) => !one.matches("[hidden], .unwanted"));
@@ -123,7 +123,7 @@ class Phone {
     this.tab = tab;
     this.show("");
     const card = document.getElementById(tab) as HTMLDetailsElement;
-    // It may have changed while it was not seen.
+    // It may have changed while it was hidden.
     if (card.matches("details")) card.dispatchEvent(new Event("toggle"));
   }
 

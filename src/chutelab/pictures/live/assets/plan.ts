@@ -1,5 +1,5 @@
-// A scene as the core takes it, one row of numbers, and the surfaces that it lays of that: what
-// `machine/rows.py` is in Python.
+// A scene as one row of numbers for the core, and the surfaces that it builds from that: like
+// Python's `machine/builder.py`.
 
 import { Memory, type Layout } from "./core.ts";
 import { Fault, met, moversOf, type Point, type Scene } from "./scene.ts";
@@ -7,7 +7,7 @@ import { useCore } from "./trig.ts";
 
 type Segment = { start: Point, end: Point, tangent: Point, length: number, speed: number,
   appears: number, vanishes: number, surface: number, one_sided: number };
-/** How a surface moves, as `Mover` of layout.h */
+/** The motion of a surface, as `Mover` of layout.h */
 export type Mover = { surface: number, pivot: Point, by: Point, frequency: number, phase: number,
   way: Point, from: number, lasts: number, turn: number, inertia: number, mass: number,
   moment: Point, spring: number, rest: number, damper: number, stops: Point, motor: Point,
@@ -15,7 +15,7 @@ export type Mover = { surface: number, pivot: Point, by: Point, frequency: numbe
 type Arc = { center: Point, radius: number, begin: number, extent: number, speed: number,
   appears: number, vanishes: number, surface: number, one_sided: number };
 
-/** Numbers of what keys may say in words; `drop_from` and `passes` as in layout.h. */
+/** Numbers for values in words; `drop_from` and `passes` as in layout.h. */
 const WORDS: Record<string, number> = {
   adhesion: Infinity, impact: 0.0, top: 1.0, up: 1, down: -1, right: 2, left: -2, out: 3, in: -3,
 };
@@ -23,16 +23,16 @@ const WORDS: Record<string, number> = {
 /** The core of this thread. */
 let core: Memory;
 
-/** The core of this thread, with what is laid. */
+/** The core of this thread, with the surfaces built. */
 export const memory = () => core;
 
-/** Start the core of this thread, which builds machines, and knows sines. */
+/** Start the core of this thread, which builds machines, and computes sines. */
 export async function startPlan(module: WebAssembly.Module, layout: Layout) {
   core = new Memory(await WebAssembly.instantiate(module, {}), layout);
   useCore(core);
 }
 
-/** Returns the keys of a struct of layout.h as numbers, NaN for what is not given. */
+/** Returns the keys of a struct of layout.h as numbers, NaN for missing ones. */
 function numbersOf(struct: string, table: any) {
   return Object.entries(core.layout.structs[struct].fields).flatMap(([key, [, , many]]) => {
     const given: (number | string | boolean)[] = [table[key] ?? []].flat(2);
@@ -83,7 +83,7 @@ function rowOf(scene: Scene, names: string[]): number[] {
 }
 
 /**
- * Has the core lay the surfaces of a scene.
+ * Has the core build the surfaces of a scene.
  * @throws {Fault} if the plate has no length
  */
 export function lay(scene: Scene, names: string[]): {

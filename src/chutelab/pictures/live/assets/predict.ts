@@ -1,4 +1,4 @@
-// First say where it goes, then see: path, landing and numbers are not in the page until then.
+// Predict first, then see: path, landing and numbers are not in the page until then.
 
 import { historyOf } from "./stages.ts";
 import { svg } from "./scenery.ts";
@@ -11,10 +11,10 @@ export type Place = [number, number];
 /** Steps of arrow keys, m; with Shift a tenth of it. */
 const MARK_STEP = 0.01;
 
-/** Points of a sketch at most, and pixels from one to the next. */
+/** Most points of a sketch, and their distance in pixels. */
 const MOST_POINTS = 20, APART = 12;
 
-/** What tells of a run; it is taken out of the page while that is to be predicted. */
+/** Elements that show a run; they are removed from the page while it is to be predicted. */
 const TELLS = ".reveals, .tools, .looks, .watch, #panels > .card:not(#edit, #share), #share label";
 
 const WAYS: Record<string, Place> = {
@@ -22,7 +22,7 @@ const WAYS: Record<string, Place> = {
   PageUp: [10, 0], PageDown: [-10, 0],
 };
 
-/** What hides the run. */
+/** Functions that hide the run. */
 class Curtain {
   hides = false;
   away: [Element, Comment][] = [];
@@ -52,8 +52,8 @@ class Curtain {
   }
 }
 
-/** A flag that is put where something is expected: on the outgoing belt, on the pulley, or
- * anywhere. */
+/** A flag put at the expected place of an event: on the outgoing belt, on the pulley, or anywhere.
+ */
 class Flag {
   at: Place = [0, 0];
   isSet = false;
@@ -89,7 +89,7 @@ class Flag {
     painters.splice(painters.indexOf(this.painter), 1);
   }
 
-  /** Put it where nothing is said yet. */
+  /** Put it at its neutral place. */
   begin() {
     const { free } = this.stage.view, { view } = this.stage;
     this.at = this.near(view.worldX(0.5 * (free.left + free.right)),
@@ -97,7 +97,7 @@ class Flag {
     this.isSet = false;
   }
 
-  /** Where the outgoing belt runs; null if it is not asked where on it. */
+  /** The outgoing belt's line; null if the question is not about it. */
   get belt() {
     const { incoming, outgoing } = this.lab.scene ?? {};
     return this.what === "landing" && outgoing && incoming ? {
@@ -106,7 +106,7 @@ class Flag {
     } : null;
   }
 
-  /** The place nearest to one where it can be. */
+  /** The nearest allowed place. */
   near(x: number, y: number): Place {
     const { belt } = this, { pulley, radius } = this.lab.machine as any;
     if (belt) return [Math.min(Math.max(x, belt.left), belt.right), belt.y];
@@ -138,7 +138,7 @@ class Flag {
     });
     for (const end of ["pointerup", "pointercancel"]) {
       grip.addEventListener(end, () => {
-        // It may be right where it stands.
+        // Its present place may be right.
         if (held && !this.isSet) this.set(...this.at);
         held = false;
       });
@@ -152,7 +152,7 @@ class Flag {
     });
   }
 
-  /** Where it went: the mean of all that it happened to; null as long as there is nothing. */
+  /** The actual place: the mean over all particles with the event; null without one. */
   get went(): Place | null {
     const { lab: { recording }, what } = this, history = historyOf(this.lab);
     if (!recording || !history || this.stage.blind || !this.isSet) return null;
@@ -165,7 +165,7 @@ class Flag {
     return places.length ? [mean("x"), mean("y")] : null;
   }
 
-  /** How far off it was, m; NaN as long as that is not known. */
+  /** Its error, m; NaN if not known yet. */
   get off() {
     const { went, at: [x, y] } = this;
     return went ? Math.hypot(went[0] - x, this.belt ? 0 : went[1] - y) : NaN;
@@ -183,14 +183,14 @@ class Flag {
   }
 }
 
-/** A path that is drawn into the picture by hand, or point by point with the keyboard. */
+/** A path drawn into the picture by hand, or point by point with the keyboard. */
 class Sketch {
   isOpen = true;
   line;
   pen;
   tip: Place;
 
-  /** @param changed called whenever it is another one */
+  /** @param changed called whenever it changes */
   constructor(
     readonly stage: Stage, readonly words: Words, public points: Place[],
     readonly changed: () => void,
@@ -224,7 +224,7 @@ class Sketch {
     this.changed();
   }
 
-  /** Draw with what is pressed on the picture, before anything else is done with it. */
+  /** Use presses on the picture for drawing, before anything else uses them. */
   listen() {
     const { stage, pen } = this, { front, view, home } = stage, stopped = new AbortController();
     const options = { capture: true, signal: stopped.signal };
@@ -278,7 +278,7 @@ class Sketch {
     this.draw();
   }
 
-  /** Keep so many points that it is still the same line. */
+  /** Reduce the points without changing the line. */
   thin() {
     while (this.points.length > MOST_POINTS) {
       this.points = this.points.filter((_, n) => n % 2 === 0 || n === this.points.length - 1);
@@ -333,7 +333,7 @@ class Prediction {
 
   given: object | undefined;
 
-  /** Another scene asks anew. */
+  /** A new scene asks again. */
   changed() {
     const { lab, flag } = this;
     if (this.given === lab.given || !lab.scene) return;
@@ -363,7 +363,7 @@ class Prediction {
     return flag.isSet;
   }
 
-  /** Say what to do, and how far off it was once that is known. */
+  /** Say what to do, and the error once it is known. */
   tell() {
     const { lab, words, flag, always, curtain: { hides } } = this, { off } = flag;
     const wish = flag.isSet ? "mark-play" : this.asked ? "mark-first" : "mark-set";
@@ -372,7 +372,7 @@ class Prediction {
       : isFinite(off) ? words.say("mark-off", { distance: words.number(100 * off, 3) })
         : isOver ? words.say("mark-none") : "";
     this.note.hidden = !said;
-    // Only what is new is read out.
+    // Screen readers read only changes.
     if (this.note.textContent !== said) this.note.textContent = said;
   }
 }

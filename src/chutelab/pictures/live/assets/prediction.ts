@@ -1,9 +1,9 @@
 // `predict`: the closed form's answer for a scene, or the reason why it has none.
 //
-// `transfer` knows no ends of plate and belt, and nothing in the way. What the particle touches,
-// and in which order, the run tells. As Python's `theory/prediction.py`, which looks for it, but
-// for belts with a coefficient of friction, and for gates, which are in the way only while they
-// are there.
+// `transfer` takes plate and belt as unbounded, and has no obstacles. The run shows what the
+// particle touches, and in which order. Like Python's `theory/prediction.py`, which searches for
+// obstacles, except for belts with a coefficient of friction, and for gates, which are obstacles
+// only while they exist.
 import type { Event } from "./core.ts";
 import type { Segment } from "./machine.ts";
 import type { Recording } from "./recording.ts";
@@ -19,12 +19,12 @@ type Trouble = [Stage, Reason] | null;
 /** m; a release this close to the riding height differs from it by rounding only. */
 const RIDES = 1e-12;
 
-/** Of events, as in the enum Kind of the core. */
+/** Kinds of events, as in the enum Kind of the core. */
 const RELEASE = 0, IMPACT = 3, EXIT = 8;
 
 /**
  * Predicts particle 0 of a scene in closed form.
- * @param recording a run of the scene; what it has not come to is not in the way
+ * @param recording a run of the scene, as far as it has come
  * @returns NaN from the stage on that is not reached as the equations assume
  */
 export function predict(scene: Scene, recording: Recording): Transfer {
@@ -42,8 +42,8 @@ export function predict(scene: Scene, recording: Recording): Transfer {
   return trouble === null ? found : cutFrom(found, ...trouble);
 }
 
-/** Returns where the particle touches what the equations do not know, or misses what they take for
- * unbounded. */
+/** Returns the stage at which the particle touches something outside the equations, or misses plate
+ * or belt. */
 function troubleOf(
   scene: Scene, belt: Incoming, { events, machine }: Recording, { numbers, reason }: Transfer,
 ): Trouble {
@@ -67,11 +67,12 @@ function troubleOf(
   };
   const [left, hit, next] = events.filter(({ disk, kind }) =>
     disk === 0 && kind !== RELEASE && kind !== EXIT);
-  // What is met on the ride ends it at once.
+  // An obstacle on the ride ends the equations at once.
   if (hit && hit.t === left.t) return meets("separation", "early", hit, "in-the-way");
 
   const [sin, cos] = sinCos(phi1), rideRadius = belt.pulley_radius + machine.radius[0];
-  // The centre on the plate's line, and how far that is from the plate's lower end; NaN if nowhere.
+  // The centre on the plate's line, and its distance from the plate's lower end; NaN if it is not
+  // met.
   const [x, y] = [rideRadius * sin + x2, rideRadius * cos - y2];
   const plate = machine.surfaces.indexOf("plate");
   const face = machine.segments.find(({ surface }) => surface === plate) as Segment;
@@ -79,7 +80,7 @@ function troubleOf(
   const isOnFace = 0.0 <= foot && foot <= face.length, first = hit && nameOf(hit);
   if (first === "pulley") return meets("impact", "early", hit, "comes-down-again");
   if (isOnFace && first && first !== "plate") return meets("impact", "early", hit, "touched-first");
-  // Something else in the way of a flight that misses the plate anyway does not matter.
+  // Another obstacle does not matter if the flight misses the plate anyway.
   if (!isOnFace && first === "plate") return meets("impact", "early", hit, "plate-end");
   if (Number.isNaN(foot)) return ["impact", reason ?? because("no-impact", "turns-away")];
   if (foot < 0.0) return ["impact", because("no-impact", "below-plate", { length: -foot })];
@@ -92,7 +93,7 @@ function troubleOf(
   if (y - machine.radius[0] < belt.pulley_radius - out.drop) {
     return ["landing", because("misses", "below-belt")];
   }
-  // Events that are no impact are of a contact that lasts since the first.
+  // Events other than impacts belong to a contact that has lasted since the first one.
   const time = next?.kind === IMPACT ? next.t - hit.t : 0.0;
   if (next && nameOf(next) !== "outgoing" && !(time >= t3)) {
     return meets("landing", "second", next, "after-rebound", { time });
@@ -102,7 +103,7 @@ function troubleOf(
     ? ["landing", because("misses", "off-belt-end", { x: down })] : null;
 }
 
-/** Returns what the equations say if nothing else were in the way. */
+/** Returns the results of the equations without other obstacles. */
 function unboundedTransfer(scene: Scene, belt: Incoming, plate: Plate) {
   const kind = scene.kinds[0];
   const own = scene.particles[kind];
@@ -123,7 +124,7 @@ function unboundedTransfer(scene: Scene, belt: Incoming, plate: Plate) {
   return found(Math.max(out.drop - sunk, 0.0), out.speed);
 }
 
-/** Returns what makes the scene another problem than the paper's, "" if nothing does. */
+/** Returns why the scene is another problem than the paper's, "" if it is not. */
 function outsideOf(scene: Scene, belt: Incoming) {
   const [stream] = scene.streams;
   const own = scene.particles[scene.kinds[0]];

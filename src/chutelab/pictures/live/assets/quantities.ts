@@ -1,5 +1,4 @@
-// Quantities of a run by their names in the registry, as Python's `results/quantities.py` reads
-// them off a recording.
+// Quantities of a run by their names in the registry, like Python's `results/quantities.py`.
 
 import { quantile } from "./crowd.ts";
 import type { Event } from "./core.ts";
@@ -61,7 +60,7 @@ function symbolsOf({ left, hit, down }: Stages, { radius, mass, pulley, angle, b
   };
 }
 
-/** A quantity of each particle; NaN where there is none. */
+/** A quantity of each particle; NaN without one. */
 function each(name: string, { recording, history, scene }: Run): number[] {
   const { machine, tracks } = recording, { stages } = history;
   const [head, part, more] = name.split(".");
@@ -91,7 +90,7 @@ function each(name: string, { recording, history, scene }: Run): number[] {
   const { plates, outgoing, streams } = scene;
   const plate = plates.find(({ pivot }) => pivot === undefined);
   return stages.map(({ left, hit, down }, i) => symbolsOf(
-    // An impact is counted from the separation, a landing from the impact.
+    // An impact is relative to the separation, a landing to the impact.
     { left, hit: left && hit, down: left && hit && down }, {
       radius: machine.radius[i], mass: machine.mass[i], pulley: machine.pulley?.radius ?? NaN,
       angle: (plate?.angle_deg ?? NaN) / DEGREES, beltSpeed: outgoing?.speed ?? NaN,

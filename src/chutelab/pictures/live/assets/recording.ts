@@ -1,5 +1,5 @@
-// What a run leaves: where each particle is at any time, and its energy ledger.
-// Between the engine's knots a track is the cubic Hermite curve, as in Python's recordings.
+// The recording of a run: places of particles at any time, and the energy ledger. Between the
+// engine's knots a track is the cubic Hermite curve, as in Python's recordings.
 
 import type { Breach } from "./breaches.ts";
 import { KNOT_ROW, LOAD_ROW, TOTAL_ROW, type Machine, type Event } from "./core.ts";
@@ -14,40 +14,41 @@ export type Ledger = { start: number, kinetic: number, potential: number, belt_w
 const T = 0, X = 1, Y = 2, VX = 3, VY = 4, SPIN = 5, BELT = 6, RESTITUTION = 7, FRICTION = 8,
   ANGLE = 10;
 
-/** Of events, as in the enum Kind of the core. */
+/** Kinds of events, as in the enum Kind of the core. */
 const RELEASE = 0, SEPARATION = 1;
 
-/** Straight parts in which a piece of a track is drawn at most. */
+/** Most straight parts in which a piece of a track is drawn. */
 const MOST_CHORDS = 500;
 
 /** Knots of one particle, `KNOT_ROW` doubles each. */
 class Track {
   /** @param up the direction against gravity
-   * @param tells whether its knots have angles: what has corners is turned to the last bit */
+   * @param tells whether its knots have angles, so that boxes and polygons have theirs to the last
+   * bit */
   constructor(readonly up: [number, number] = [0, 1], readonly tells = false) {}
 
   rows = new Float64Array(8 * KNOT_ROW);
 
   count = 0;
 
-  /** Where it was looked for last. */
+  /** Index of the last search. */
   near = 0;
 
-  /** How many of the last knots only tell how far it has come, until there are others. */
+  /** Number of preliminary knots at the end, which only show how far it has come. */
   tip = 0;
 
-  /** Whether it is still under way where the run has come to. */
+  /** Whether it is still under way at the end of the run so far. */
   live = false;
 
-  /** Forget the knots that only tell how far it has come. */
+  /** Remove the preliminary knots. */
   dropTips() {
     this.count -= this.tip;
     this.tip = 0;
-    // To set a length takes long, even if it is the same.
+    // Setting a length takes long, even if it does not change.
     if (this.turns.length > this.count) this.turns.length = this.count;
   }
 
-  /** @param from where the knot's row begins in `knots` @param shift s */
+  /** @param from beginning of the knot's row in `knots` @param shift s */
   add(knots: ArrayLike<number>, from: number, shift: number, entries: number[] | null) {
     if ((this.count + 1) * KNOT_ROW > this.rows.length) {
       const rows = new Float64Array(2 * this.rows.length);
@@ -120,7 +121,7 @@ class Track {
     return low;
   }
 
-  /** Forget what is after t, but for the state then.
+  /** Remove everything after t, and keep the state then.
    * @param entries of the ledger then, J */
   cut(t: number, entries: number[]) {
     const state = this.state(t);
@@ -139,7 +140,7 @@ class Track {
     this.add([t, x, y, vx, vy, spin, ...entries, 0, angle], 0, 0, null);
   }
 
-  /** Position, velocity and spin; null before the release, and where the track ended after it. */
+  /** Position, velocity and spin; null before the release, and after the end of the track. */
   state(t: number): State | null {
     if (!this.count || t < this.rows[0]) return null;
     const last = this.count - 1;
@@ -154,8 +155,8 @@ class Track {
     };
   }
 
-  /** Place and velocity just before a time at which it is under way: before a blow, if one is
-   * then. */
+  /** Place and velocity just before a time at which it is under way: before an impact at that time.
+   */
   before(t: number) {
     let i = this.knotBefore(t);
     while (i > 0 && this.at(i, T) >= t) i -= 1;
@@ -190,8 +191,8 @@ class Track {
     return va + s * (2 * (3 * slope - 2 * va - vb) + 3 * s * (va + vb - 2 * slope));
   }
 
-  /** Points from a knot to the next, both among them: straight lines between them miss the track
-   * by `fine` (m). Over a time h a chord misses a curve by at most h²/8 times its largest
+  /** Points from a knot to the next, both included: straight lines between them miss the track by
+   * `fine` (m). Over a time h a chord misses a curve by at most h²/8 times its largest
    * acceleration, which a cubic has at one of its ends. */
   chords(i: number, fine: number) {
     const t = this.at(i, T), h = this.at(i + 1, T) - t;
@@ -212,7 +213,7 @@ class Track {
     return points;
   }
 
-  /** By how much it is turned, from as it is written, counterclockwise, rad. */
+  /** Counterclockwise angle from its shape as written, rad. */
   angle(t: number) {
     if (!this.count || t <= this.begin) return this.count && this.tells ? this.at(0, ANGLE) : 0;
     const i = t >= this.end ? this.count - 1 : this.knotBefore(t);
@@ -227,7 +228,7 @@ class Track {
     return this.turns[i] + 0.5 * h * (this.at(i, SPIN) + spin);
   }
 
-  /** The integral of its spin from a knot on, corrected evenly up to the next. */
+  /** The integral of its spin from a knot on, corrected evenly to the next knot's angle. */
   told(t: number, i: number) {
     const from = this.at(i, ANGLE), spin = this.at(i, SPIN);
     if (i === this.count - 1) return from;
@@ -236,10 +237,10 @@ class Track {
     return from + s * (h * (spin + 0.5 * s * (this.at(i + 1, SPIN) - spin)) + even);
   }
 
-  /** Angle at each knot, as far as it was asked for. */
+  /** Angle at each knot, as far as it was needed. */
   turns: number[] = [];
 
-  /** Belt work, restitution loss and friction loss so far, J, straight between knots. */
+  /** Belt work, restitution loss and friction loss so far, J, linear between knots. */
   entries(t: number) {
     const i = t >= this.end ? this.count - 1 : this.knotBefore(t);
     const h = i + 1 < this.count ? this.at(i + 1, T) - this.at(i, T) : 0;
@@ -251,7 +252,7 @@ class Track {
   }
 }
 
-/** What each particle is called, whatever comes before it: by its stream, and which of it. */
+/** Names of particles that do not depend on other streams: stream, and number in it. */
 function namesOf({ releases, streams }: Machine) {
   const count = streams.map(() => 0);
   return releases.map(({ stream }) => {
@@ -263,34 +264,35 @@ function namesOf({ releases, streams }: Machine) {
 const trackOf = ({ up, outlines, releases }: Machine, i: number) =>
   new Track(up, outlines[releases[i].kind].length > 0);
 
-/** The tracks and events of a run, which may still go on. */
+/** The tracks and events of a run, which may still be running. */
 class Recording {
   tracks;
   events: Event[] = [];
   state = "running";
-  /** s up to which all is there. */
+  /** It is complete up to this time, s. */
   now = 0;
-  /** What a run that goes on after a change calls the particles, and what it adds to entries. */
+  /** For a run that continues after a change: the engine's numbers of particles, and entries to be
+   * added. */
   renamed: { index: number, entries: number[], goesOn: boolean }[] | null = null;
   shift = 0;
-  /** Belt work, restitution and friction loss by surface, and of the particles among each other,
-   * J, once the run is over; none if the scene was changed under way. */
+  /** Belt work, restitution and friction loss by surface, and between particles, J, after the run;
+   * none if the scene was changed during it. */
   books: number[][] | null = null;
-  /** By which the engine's solves broke their law of energy, J. */
+  /** Energy by which the engine's solver broke its law, J. */
   gained = 0;
   unsolved = 0;
   /** Impacts and steps so far. */
   contacts = 0;
   steps = 0;
-  /** States of what hangs on hinges, by surfaces. */
+  /** States of hinges, by surfaces. */
   swings: Map<number, Swings> = new Map();
-  /** What surfaces bear, `LOAD_ROW` numbers each, bin by bin. */
+  /** Loads on surfaces, `LOAD_ROW` numbers each, bin by bin. */
   loads = new Float64Array();
   /** Times, s, and the work of all pushes and of all surfaces up to then, J. */
   pushes: [number, number, number][] = [];
-  /** Of a machine with joints what all particles have at its steps, `TOTAL_ROW` numbers each. */
+  /** With joints: totals of all particles at the steps, `TOTAL_ROW` numbers each. */
   totals: Float64Array[] = [];
-  /** The laws that it breaks, once it is over and has been judged. */
+  /** The laws that it breaks, once it is finished and judged. */
   breaches: Breach[] = [];
 
   constructor(public machine: Machine) {
@@ -336,7 +338,7 @@ class Recording {
     }
     for (const event of events) {
       const { index, goesOn } = its(event.disk);
-      // A particle that goes on after a change is not released once more.
+      // A particle that continues after a change is not released again.
       if (goesOn && event.kind === RELEASE && event.t === 0) continue;
       const other = event.other >= 0 ? its(event.other).index : event.other;
       this.events.push({ ...event, t: event.t + this.shift, disk: index, other });
@@ -363,7 +365,7 @@ class Recording {
     this.loads = loads;
   }
 
-  /** When the last track ends, and the first begins, s. */
+  /** End of the last track, and beginning of the first, s. */
   get end() {
     return this.span[1];
   }
@@ -383,16 +385,16 @@ class Recording {
 
   span = [Infinity, -Infinity];
 
-  /** Forget what is after t, and return the machine by which a run goes on from there, in a time
-   * that begins then: with those under way, and with those still to come. */
+  /** Remove everything after t, and return the machine for continuing from there, with its time
+   * beginning then: with particles under way, and those to be released. */
   goOn(t: number, machine: Machine): Machine {
     const renamed: { index: number, entries: number[], goesOn: boolean }[] = [];
     const releases: Machine["releases"] = [];
     const spins: number[] = [], angles: number[] = [];
-    // Where each is in the run so far: streams that come and go move those after them.
+    // Number of each in the run so far: added and removed streams shift later ones.
     const earlier = new Map(namesOf(this.machine).map((name, index) => [name, index]));
     const was = namesOf(machine).map((name) => earlier.get(name) ?? -1);
-    // What a change finds out of balance would stay so.
+    // A balance that is open at a change would stay open.
     const booked = was.map((index) => {
       const ledger = index < 0 ? null : this.ledgerOf(index, t);
       return ledger
@@ -411,7 +413,7 @@ class Recording {
       angles.push(track.angle(t));
       if (state) {
         const { x, y, vx, vy } = state;
-        // A particle that still rides the belt goes on riding.
+        // A particle that still rides the belt keeps riding.
         const carried = release.carried && x < 0 && !this.hasLeft(index, t);
         releases.push({ ...release, x, y, vx, vy, t: 0, carried });
         track.tip = 1;
@@ -437,9 +439,9 @@ class Recording {
     };
   }
 
-  /** Events up to t as a changed machine numbers particles and surfaces; of what was taken away
-   * nothing is left.
-   * @param was where each particle was */
+  /** Events up to t with a changed machine's numbers of particles and surfaces, without removed
+   * ones.
+   * @param was earlier number of each particle */
   renumbered(t: number, was: number[], surfaces: string[]) {
     const now: Map<number, number> = new Map(was.map((index, n) => [index, n]));
     const names = this.machine.surfaces;
@@ -458,10 +460,9 @@ class Recording {
       event.disk === index && event.kind === SEPARATION && event.t <= t);
   }
 
-  /** The energy ledger of one particle; while it slips the balance gives the slip heat, else, while
-   * it is driven, the belt's work, else what lasting contacts take, and in flight what it leaves
-   * over is the residual. In a crowd particles give energy to each other, and the balance is that
-   * of all. */
+  /** The energy ledger of one particle. While it slips, the rest of the balance is slip heat; else,
+   * while it is driven, belt work; else the loss of lasting contacts; in flight it is the residual.
+   * In a crowd particles give energy to each other, and the balance is that of all. */
   ledgerOf(index: number, t: number): Ledger | null {
     const track = this.tracks[index];
     const state = track.state(t);
@@ -483,7 +484,7 @@ class Recording {
       - (track.at(k, BELT) - track.at(k, RESTITUTION) - track.at(k, FRICTION));
     const h = track.at(j, T) - track.at(i, T), s = h > 0 ? (t - track.at(i, T)) / h : 0;
     let residual = residualAt(i) + Math.min(s, 1) * (residualAt(j) - residualAt(i));
-    // What straight lines leave over belongs to what goes on.
+    // The rest of linear interpolation belongs to the process that goes on.
     const missing = gain - (belt - restitution - friction) - residual;
     const changes = (column: number) => track.at(i, column) !== track.at(j, column);
     if (machine.movers.length && changes(BELT)) belt += missing;
@@ -497,7 +498,7 @@ class Recording {
     };
   }
 
-  /** Work of all pushes up to a time, J: while there is one, what surfaces have not given.
+  /** Work of all pushes up to a time, J: during a push, the work not done by surfaces.
    * @param work of both, J */
   pushedAt(t: number, work: number) {
     const { pushes } = this, n = pushes.findLastIndex(([then]) => then <= t);
@@ -506,7 +507,7 @@ class Recording {
     return more === given ? given : work - gave - ((gives - gave) * (t - from)) / (to - from);
   }
 
-  /** The ledger where joints hand energy on from one particle to another: straight from step to
+  /** The ledger with joints, which pass energy from one particle to another: linear from step to
    * step of the engine. */
   joinedLedger(t: number): Ledger | null {
     const n = this.totals.findLastIndex((all) => all[0] <= t), rows = this.totals[n];
@@ -533,8 +534,8 @@ class Recording {
     };
   }
 
-  /** Energies and losses of what hangs on hinges, of all or of one surface; none of a run that was
-   * changed under way. */
+  /** Energies and losses of hinges, of all or of one surface; none for a run that was changed
+   * during it. */
   hung(t: number, surface?: number): Hung {
     const total: Hung = {
       kinetic: 0, potential: 0, spring: 0, restitution_loss: 0, damper_loss: 0, push_work: 0,
@@ -549,7 +550,7 @@ class Recording {
     return total;
   }
 
-  /** The ledger of all particles that have been released, and of what hangs on hinges. */
+  /** The ledger of all released particles, and of hinges. */
   ledger(t: number): Ledger {
     const joined = this.joinedLedger(t);
     if (joined) return joined;
@@ -562,11 +563,11 @@ class Recording {
       const its = this.ledgerOf(index, t);
       if (its) for (const name of names) total[name] += its[name];
     }
-    // A track has what pushes give among what drives give.
+    // In a track the work of pushes is part of that of drives.
     total.push_work = this.pushedAt(t, total.belt_work);
     total.belt_work -= total.push_work;
-    // Particles have what hinges give them among it, too. What those have not of motors came from
-    // what touched them.
+    // It also includes the work of hinges on particles. The energy of hinges that does not come
+    // from motors came from contacts.
     const [begun, hung] = [0, t].map((then) => this.hung(then));
     const kept = ({ kinetic, potential, spring }: Hung) => kinetic + potential + spring;
     total.start += kept(begun);
@@ -576,7 +577,7 @@ class Recording {
     return total;
   }
 
-  /** Points of a track, its knots among them: straight lines between them miss it by `fine` (m). */
+  /** Points of a track, including its knots: straight lines between them miss it by `fine` (m). */
   points(index: number, fine: number) {
     const track = this.tracks[index];
     if (!track?.count) return [];

@@ -1,4 +1,4 @@
-// Where, when and how fast each particle starts: the core draws it, see Python's
+// Place, time and velocity of each particle's start, drawn by the core, see Python's
 // `machine/releases.py`.
 import { memory } from "./plan.ts";
 import { Fault, type Scene } from "./scene.ts";
@@ -20,14 +20,14 @@ export interface Release {
 type Refusal = { distance: number, reach: number, why: number, stream: number, particle: number,
   surface: number };
 
-/** Particles and places that a call looks at: as many as there are. */
+/** Particles and places that a call tries: all of them. */
 const LOOKS = 2 ** 31 - 1;
 
 /**
  * Has the core draw the releases of a scene whose surfaces it has just laid, and the radii of the
  * particles.
  * @param names of the surfaces
- * @throws {Fault} if a box has not room for all, or a particle would start inside a surface
+ * @throws {Fault} if a box has no room for all, or a particle would start inside a surface
  */
 export function draw(scene: Scene, names: string[]): { releases: Release[], radius: number[] } {
   const core = memory(), { Refused, Status } = core.layout.enums, { streams, kinds } = scene;

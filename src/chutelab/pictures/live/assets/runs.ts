@@ -1,5 +1,5 @@
-// The runs that a step notes: a table that fills by a button, rows that set the machine, and the
-// paths of the runs, grey and numbered.
+// The runs of a step: a table filled by a button, rows that set the machine, and the paths of the
+// runs, grey and numbered.
 
 import { toCsv, download, fileStem } from "./share.ts";
 import { historyOf } from "./stages.ts";
@@ -17,23 +17,23 @@ import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
 
 type Row = { head: string, set: Record<string, unknown> };
-/** A formula of quantities, null of what is filled in by hand; what is given stands there already.
- */
+/** A formula of quantities, null if filled in by hand; `given` values are printed. */
 type Column = { head: string, value: Tree | null, unit: string, given: (string | number)[] };
 export type Wanted = { columns: Column[], rows: Row[], free: number, set: Record<string, unknown> };
-/** A run of a row: what was changed for it, its values, and what was written by hand */
+/** A run of a row: changed keys, its values, and cells filled in by hand */
 export type Noted = { set?: Record<string, unknown>, values?: (number | null)[],
   own?: Record<number, string>, head?: string };
 
-/** How far apart the numbers of paths are at least, px. */
+/** Least distance of the numbers of paths, px. */
 const ROOM = 30;
 
-/** The values of a scene, whatever way they are written. */
+/** The values of a scene, independent of their form. */
 const plain = (scene: Scene) =>
   JSON.stringify(scene, (key, value) => (["given", "title", "live"].includes(key)
     ? undefined : value === Infinity ? "inf" : value));
 
-/** A table as rows of cells: numbers, and the markup of heads and of what is empty or by hand. */
+/** A table as rows of cells: numbers, and markup of heads, of empty cells and of those filled in by
+ * hand. */
 function tableOf({ columns, rows, free }: Wanted, noted: Noted[], words: Words) {
   const written = (text: string) => html("i", {}, text).innerHTML;
   return [
@@ -62,7 +62,7 @@ class Runs {
 
   /** @param noted by row, kept with the answers
    * @param changed called when something was noted
-   * @param label what a run of one's own is called */
+   * @param label of the student's own runs */
   constructor(
     readonly lab: Lab, readonly stage: Stage, readonly words: Words, readonly wanted: Wanted,
     readonly noted: Noted[], readonly changed: () => void, readonly newEngine: () => Engine,
@@ -100,12 +100,12 @@ class Runs {
     this.numbers.remove();
   }
 
-  /** Whether nothing in it is told by a run. */
+  /** Whether no cell is filled by a run. */
   get isByHand() {
     return this.wanted.columns.every(({ value }) => value === null);
   }
 
-  /** Whether every wanted run is there, or of a table of free rows one. */
+  /** Whether every required run is noted, or at least one in a table of free rows. */
   get isDone() {
     const { rows } = this.wanted;
     if (this.isByHand) return this.noted.some((one) => Object.values(one?.own ?? {}).some(Boolean));
@@ -118,7 +118,7 @@ class Runs {
     return withValues(lab.first, { ...wanted.set, ...set });
   }
 
-  /** The row of the machine as it is now, -1 if there is none. */
+  /** The row of the present machine, -1 if there is none. */
   get row() {
     const { lab, wanted: { rows, free }, noted } = this;
     if (!lab.scene) return -1;
@@ -133,14 +133,14 @@ class Runs {
     return -1;
   }
 
-  /** Why there is nothing to be noted yet, by a word of the catalogue; "" if there is. */
+  /** Why nothing can be noted yet, as a word of the catalogue; "" if it can. */
   get reason() {
     const { lab } = this;
     if (!lab.isOver || lab.t <= lab.start || lab.recording?.state !== "done") return "note-wait";
     return this.row < 0 ? "note-no-row" : "";
   }
 
-  /** Put what the run tells into its row. */
+  /** Put the run's values into its row. */
   note() {
     const { lab, wanted, noted, row } = this, history = historyOf(lab);
     if (this.reason || !lab.recording || !lab.scene || !history) {
@@ -180,7 +180,7 @@ class Runs {
     this.drawPaths();
   }
 
-  /** Run anew what was noted at an earlier visit, for its path. */
+  /** Repeat a run noted at an earlier visit, for its path. */
   async again() {
     const { lab, noted } = this, left = [...noted.keys()].filter((n) => noted[n]?.values);
     if (!left.length) return;
@@ -206,7 +206,7 @@ class Runs {
     this.lab.restart();
   }
 
-  /** The rows as they are now. */
+  /** Show the present rows. */
   draw() {
     const { wanted: { columns, rows, free }, noted, words } = this;
     const made = Array.from({ length: rows.length + free }, (_, n) => {
@@ -242,7 +242,7 @@ class Runs {
     this.body.replaceChildren(...made);
   }
 
-  /** Say whether the run can be noted, and which row the machine is set for. */
+  /** Show whether the run can be noted, and the row of the present machine. */
   refresh() {
     const { words, reason, row } = this;
     this.button.setAttribute("aria-disabled", String(reason !== ""));
@@ -252,7 +252,7 @@ class Runs {
       one.classList.toggle("now", n === row && n < this.wanted.rows.length));
   }
 
-  /** Paths below that of the run, and above all their numbers, apart from the other paths. */
+  /** Paths below that of the run, and their numbers on top, away from other paths. */
   drawPaths() {
     const { view, home } = this.stage, taken: [number, number][] = [];
     const labels: DOMRect[] = [...home.querySelectorAll(".symbols text")]

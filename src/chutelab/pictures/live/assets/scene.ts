@@ -1,5 +1,5 @@
-// A scene as its file has it, and with all defaults: `resolve`. The same rules as in Python's
-// `chutelab.scene`, of which a page needs those about what can be edited. `keys.ts` changes keys.
+// A scene as in its file, and with all defaults: `resolve`. The same rules as in Python's
+// `chutelab.scene`, as far as a page can edit. `keys.ts` changes keys.
 import { JOINTS, conflictsOf, listOf, misfitsOf, straysOf } from "./checks.ts";
 import type { Form } from "./forms.ts";
 import type { Tree } from "./formula.ts";
@@ -10,7 +10,7 @@ export type Given = Record<string, any>;
 
 /** What a key may hold */
 export interface Rule {
-  default?: any; // absent where a key has none
+  default?: any; // absent if a key has none
   required?: boolean;
   unit?: string;
   low?: number;
@@ -29,17 +29,17 @@ export interface Lab {
 interface Particle {
   name?: string;
   shape: "disk" | "sphere" | "box" | "polygon";
-  radius: number; // the mean one where they differ; of what has corners the furthest one's
+  radius: number; // the mean if they differ; with corners that of the furthest corner
   size?: Point; // of a box, m
   points?: Point[]; // of a polygon
-  outline: Point[]; // corners about the centroid, counterclockwise, m; none of what is round
-  span?: Point; // the least and the largest radius where they differ
+  outline: Point[]; // corners about the centroid, counterclockwise, m; none if round
+  span?: Point; // the least and the largest radius if they differ
   mass: number;
   density?: number;
   material?: string;
   spin: boolean;
   rolling_friction: number;
-  restitution_speed?: number; // above it restitution falls; without it never does
+  restitution_speed?: number; // restitution decreases above it; without it never
   given: Given; // the keys that were written
 }
 
@@ -65,7 +65,7 @@ interface Stream {
   given: Given;
 }
 
-/** How a plate or a surface moves: at most one of `hinge` and the three before it */
+/** Motion of a plate or a surface: at most one of `hinge` and the three before it */
 export interface Moves {
   turn: number; // degrees/s
   shake?: { by: Point, frequency: number, phase_deg: number };
@@ -80,7 +80,7 @@ export interface Moves {
   starts_when?: When;
 }
 
-/** What is to be touched for something to happen */
+/** Condition of a trigger */
 type When = { touched: string };
 
 export interface Plate extends Moves {
@@ -149,11 +149,11 @@ interface Outgoing {
   given: Given;
 }
 
-/** What a particle hangs on, or two hold each other by, as `machine/parts.py` has it */
+/** A joint of a particle with a point or another particle, as in `machine/parts.py` */
 export interface Joint {
   kind: typeof JOINTS[number];
   from?: Point;
-  over?: Point; // of a string between two: the pulley that it runs over
+  over?: Point; // for a string between two: the pulley that it runs over
   particle: number;
   other?: number;
   length?: number;
@@ -162,7 +162,7 @@ export interface Joint {
   given: Given;
 }
 
-/** All defaults filled in; names as in the file, but for three lists */
+/** All defaults filled in; names as in the file, except for three lists */
 export interface Scene {
   title: string;
   gravity: number;
@@ -184,16 +184,16 @@ export interface Scene {
   kinds: number[]; // which of the particles each stream consists of
   count: number; // of all particles
   crowded: boolean; // whether particles meet
-  most: number; // how many particles a page has room for
-  sensor: { name: string, from: Point, to: Point }[]; // lines that count what passes
+  most: number; // most particles of a page
+  sensor: { name: string, from: Point, to: Point }[]; // sensors
   view: { from: Point, to: Point } | null; // corners of what is shown
 }
 
-/** What is wrong with a scene. */
+/** A fault of a scene. */
 export class Fault extends Error {
   /**
    * @param key full path, such as `plate.angle_deg` or `surface[1].radius`
-   * @param value what was found there; undefined if the key is missing
+   * @param value the value found; undefined if the key is missing
    * @param text id of a text in the catalogue
    * @param words numbers and names for that text
    */
@@ -224,7 +224,7 @@ export function resolve(given: Given, lab: Lab): Scene {
   const rows = (table: string) => {
     return listOf(given[table]).map((row) => filled(table, row));
   };
-  // A map, for a name may be one that every object has.
+  // A map, as a name may be one that every object has.
   const materials = new Map(Object.entries(lab.presets));
   for (const { name, ...own } of listOf(given.material)) {
     for (const key of ["restitution", "friction"]) {
@@ -287,13 +287,13 @@ const namedOf = ({ plates, surface }: Scene): [string, Plate | Surface][] => [
   ...surface.map((one): [string, Surface] => [one.name, one]),
 ];
 
-/** Returns what moves, and the names of these surfaces. */
+/** Returns moving rows, and the names of their surfaces. */
 export function moversOf(scene: Scene): [string, (Plate | Surface)][] {
   return namedOf(scene).filter(([, { turn, shake, travel, hinge }]) =>
     turn || shake || travel || hinge);
 }
 
-/** Returns what waits for a touch: a surface, what it then does, and which one is to be touched. */
+/** Returns triggers: a surface, its action, and the surface to be touched. */
 export function triggersOf(scene: Scene): [string, "opens" | "closes" | "starts", string][] {
   return namedOf(scene).flatMap(([name, one]) =>
     (["opens", "closes", "starts"] as const).flatMap((doing) => {
@@ -302,11 +302,11 @@ export function triggersOf(scene: Scene): [string, "opens" | "closes" | "starts"
     }));
 }
 
-/** Returns whether a pair is of a kind of particles and another one, or a surface, by name. */
+/** Returns whether a pair is that of a kind of particles and another kind or surface, by name. */
 const isOf = ({ between: [a, b] }: Scene["pair"][number], one?: string, other?: string) =>
   (a === one && b === other) || (b === one && a === other);
 
-/** Returns the key by which two pull at each other, if they do. */
+/** Returns the key of the cohesion of a pair, if it has one. */
 export const clinging = ({ cohesion, bond_number: bonds }: Scene["pair"][number]) =>
   cohesion > 0 ? "cohesion" : bonds > 0 ? "bond_number" : null;
 
@@ -321,7 +321,7 @@ export function cohesionOf(
   return one.bond_number * (Math.min(...masses) * gravity);
 }
 
-/** Tells whether two kinds pass through each other. */
+/** Returns whether two kinds pass through each other. */
 export function passes({ particles, pair }: Scene, a: number, b: number) {
   return pair.some((one) => !one.meet && isOf(one, particles[a].name, particles[b].name));
 }
@@ -357,7 +357,7 @@ export function polygonMoment(points: Point[]) {
   return plainSum(moments) / (6.0 * plainSum(crosses));
 }
 
-/** Fills in the mean radius of particles, and the mass that goes with that. */
+/** Fills in the mean radius of particles, and the mass at that radius. */
 function fillMass(kind: any, materials: Map<string, Record<string, number>>) {
   kind.outline = outlineOf(kind);
   if (kind.outline.length) {
@@ -392,16 +392,16 @@ function fillRate(stream: any, number: number, kind: Particle) {
   stream.rate = Number(found?.[1]) / 3.6 / mass / slices(stream, kind);
 }
 
-/** Returns how many slices, each one particle thick, the material of a stream is wide. */
+/** Returns the width of a stream's material in slices of one particle's thickness. */
 export function slices({ width }: Stream, kind: Particle) {
   return width === undefined ? 1.0 : width / (2.0 * kind.radius);
 }
 
 /**
- * Returns restitution and friction of a kind of particles and another kind, or a surface.
- * What a pair says counts first, then what the surface (or a stream of the kind) says, then the
- * material, then the default. Of two kinds that nothing is said of it is the geometric mean of
- * what each has with itself.
+ * Returns restitution and friction of a kind of particles and another kind, or a surface. Values
+ * come first from the pair, then from the surface (or a stream of the kind), then from the
+ * material, then from the default. For two different kinds without a value it is the geometric mean
+ * of the values of each with itself.
  * @param other a kind, or the name of a surface
  * @returns friction is Infinity with adhesion
  */
@@ -434,9 +434,9 @@ export function met(scene: Scene, kind: number, other: number | string): [number
 }
 
 /**
- * @param homes tables that may say them
+ * @param homes tables that may have them
  * @param column of the material
- * @param grips whether friction is the belt's own matter
+ * @param grips whether friction belongs to the belt only
  */
 function ownValues(
   scene: Scene, particle: Particle, homes: { restitution: number, friction: any, given: Given }[],
@@ -452,7 +452,7 @@ function ownValues(
   return [value("restitution"), value("friction")];
 }
 
-/** Returns the table that a surface is from, by its name, and what it is made of. */
+/** Returns the table of a surface, by its name, and its material. */
 function surfaceTable(
   scene: Scene, name: string,
 ): { home: any, steel: boolean, belt: boolean } {

@@ -216,6 +216,25 @@ def test_a_plate_that_is_turned_meets_what_sleeps_where_it_comes_by(pegs):
     closes(run.recording)
 
 
+def test_a_plate_that_is_turned_leaves_the_load_of_a_hinge_as_it_is():
+    """All disks lie on the hinge, so that all of them and both surfaces are solved together."""
+    sides = [[-0.3, 0.6], [-0.3, 0.0], [0.3, 0.0], [0.3, 0.6]]
+    tray = {"name": "tray", "points": sides, "hinge": [0.0, 0.0], "inertia": 0.05, "friction": 0.5}
+    tray |= {"stops_deg": [-5.0, 5.0], "spring": 50.0, "damper": 1.0, "restitution": 0.1}
+    far = {"name": "far", "pivot": [2.0, 0.5], "angle_deg": 0.0, "above": 0.1, "below": 0.1}
+    stream = {"fill": [[-0.28, R], [0.28, 0.5]], "count": 24, "interact": True}
+    run = chutelab.start({
+        "particle": {"radius": R, "mass": M}, "surface": [tray], "plate": [far],
+        "stream": stream, "run": {"until": 1.0},
+    })  # fmt: skip
+    run.set("plate.angle_deg", 10.0)
+    while not run.done:
+        run.step(0.1)
+    assert np.hypot(*run.recording.at([0.9])[0][0].T).max() < 0.7
+    assert len(run.recording.swings) > 100
+    closes(run.recording)
+
+
 def test_belts_and_motors_are_set():
     """A disk that grips a belt goes with it; a motor is as fast as it is told to be."""
     belt = {**FLOOR, "speed": 0.5, "friction": 0.8}

@@ -44,6 +44,8 @@ EXPORT int steer(int owner, double x, double y, double angle, double until) {
     if (is_new) {
         Mover *old = W.movers;
         RESERVE(W.movers, W.mover_count + 1.0);
+        RESERVE(W.solver_bodies, W.disk_count + 2.0 + W.mover_count);
+        RESERVE(W.light_bodies, W.disk_count + 2.0 + W.mover_count);
         if (!has_room()) return 0;
         for (int k = 0; k < W.mover_count; k++) W.movers[k] = old[k];
         m = W.movers + W.mover_count++;

@@ -1,4 +1,4 @@
-// What a machine looks like: belts that run, pulleys, plates with a struck face, walls, the grid.
+// Draws a machine: running belts, pulleys, plates with a struck face, walls, the grid.
 //
 // Bodies have volume. The surface that particles meet is the outer edge of a belt and the coloured
 // face of a plate; what is drawn of their thickness lies on the other side.
@@ -12,7 +12,8 @@ import type { Words } from "./words.ts";
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** An element with its attributes, what it does by the names of events, and what is in it. */
+/** Returns an element with attributes, listeners (functions, by the name of the event) and
+ * children. */
 function filled(element: any, attributes: Record<string, unknown>, children: (string | Node)[]) {
   for (const [key, value] of Object.entries(attributes)) {
     if (typeof value === "function") element.addEventListener(key, value);
@@ -22,7 +23,7 @@ function filled(element: any, attributes: Record<string, unknown>, children: (st
   return element;
 }
 
-/** Set an attribute; one that is so already is no work for the browser. */
+/** Set an attribute, unless it has this value already: that saves the browser work. */
 function set(element: Element, name: string, value: string) {
   if (element.getAttribute(name) !== value) element.setAttribute(name, value);
 }
@@ -31,28 +32,28 @@ const svg = (
   name: string, attributes: Record<string, unknown> = {}, ...children: (string | Node)[]
 ): any => filled(document.createElementNS(SVG, name), attributes, children);
 
-/** Pixels from one cleat of a belt to the next, and of a cleat. */
+/** Distance between the cleats of a belt and length of a cleat, px. */
 const PITCH = 24, CLEAT = 5;
 
 /** Thickness of belts, px: least, most, and as a share of the picture's height. */
 const THICK = [3.5, 9, 0.0117];
 
-/** Of a belt without pulleys of its own: distance of its two strands in its thickness. */
+/** Distance of the two strands of a belt without pulleys, in thicknesses of the belt. */
 const STRANDS = 4.5;
 
-/** Thickness of plates in that of belts. */
+/** Thickness of plates, in thicknesses of belts. */
 const PLATE = 1.4;
 
-/** Thickness of walls, px: least, most, as a share of the picture's height, and of the smallest
- * bend's radius, so that there is room between pegs. */
+/** Thickness of walls: least and most, px, and its limits as shares of the picture's height and of
+ * the smallest bend's radius. The last leaves room between pegs. */
 const WALL = [0.8, 4.5, 0.02, 0.4];
 
-/** Pixels of radius from which on a pulley has spokes; and from one roller to the next. */
+/** Least radius of a pulley drawn with spokes, and distance between rollers, px. */
 const SPOKED = 9, ROLLERS = 128;
 
-/** What moves with the time that is shown: cleats, or a wheel that turns. */
+/** What moves with the shown time: cleats, or the spokes of a turning wheel. */
 type Moving = { element: any, speed: number, x?: number, y?: number, radius?: number };
-/** Drawings of a part that moves itself. */
+/** Drawings of a moving part. */
 type Carried = { elements: any[], mover: Mover };
 type Gate = { element: any, piece: Segment | Arc };
 
@@ -60,7 +61,8 @@ class Scenery {
   moving: Moving[] = [];
   gates: Gate[] = [];
   carried: Carried[] = [];
-  /** Drawings of parts by all that they show, with what moves of each; and what the grid shows. */
+  /** Drawings of parts by everything that determines them, each with what moves in it; `grid` is
+   * the same key for the grid. */
   kept: Map<string, { element: any, moving: Moving[] }> = new Map();
   grid = "";
   layer: any;
@@ -68,7 +70,7 @@ class Scenery {
   scale: any;
   thick = 6;
   wide = WALL[1];
-  /** Where little should move, only the particles do. */
+  /** The user wants less motion: belts and wheels then stand still in the picture. */
   calm = matchMedia("(prefers-reduced-motion: reduce)");
 
   constructor(readonly view: View, readonly words: Words) {
@@ -86,7 +88,7 @@ class Scenery {
     const { kept, view: { x, y, scale, width, free } } = this, drawn: any[] = [];
     const seen = [x, y, scale, width, height, free, this.wide];
     this.kept = new Map();
-    // A part that is as it was stays: the browser has nothing to paint.
+    // Keep the drawing of an unchanged part: the browser has nothing to paint.
     const part = (name: string, of: unknown, make: () => any) => {
       const key = JSON.stringify([name, of, seen]), was = kept.get(key), from = this.moving.length;
       kept.delete(key);
@@ -160,7 +162,8 @@ class Scenery {
     }
   }
 
-  /** How something moves: what it turns about, with a spring, a motor and stops, or its way. */
+  /** Returns symbols of a part's motion: bolt, spring, motor and stops of a hinge, or arrows
+   * along its path. */
   motion(mover: Mover, { segments, arcs }: Machine, goal?: [number, number]) {
     const { view } = this, group = svg("g", { class: "motion" });
     const { pivot, by, frequency, way, lasts, turn, inertia, spring, stops, motor } = mover;
@@ -207,13 +210,13 @@ class Scenery {
     return group;
   }
 
-  /** The drawings of a part. */
+  /** Returns the drawings of a part. */
   drawingsOf(name: string): any[] {
     return [...this.layer.children].filter((one) => one.getAttribute("data-part") === name);
   }
 
-  /** Move what moves to a time, s.
-   * @param swings of hinges, by surfaces */
+  /** Bring moving parts, cleats and wheels to a time, s.
+   * @param swings motions of hinges by surface */
   turn(t: number, swings?: Map<number, Swings>) {
     const { view, view: { scale } } = this;
     for (const { elements, mover } of this.carried) {
@@ -235,7 +238,7 @@ class Scenery {
     }
   }
 
-  /** Lines at round numbers of metres, and a bar that tells how long one is. */
+  /** Draw grid lines at round numbers of metres, and the scale bar. */
   drawGround(left: number, low: number) {
     const { view, ground } = this, { width, height, scale, mesh: step } = view;
     const now = JSON.stringify([view.x, view.y, scale, width, height, left, low]);
@@ -266,7 +269,8 @@ class Scenery {
       text);
   }
 
-  /** A belt along a path in px, its outer edge on the path's left; with cleats that run. */
+  /** Returns a belt with running cleats along a path in px; its outer edge is on the left of the
+   * path. */
   band(path: string, speed: number, edge = "") {
     const group = svg("g");
     const cleats = svg("path", {
@@ -279,7 +283,7 @@ class Scenery {
     return group;
   }
 
-  /** The frame that carries a belt: a bar in the coordinates of the belt, px. */
+  /** Add the frame that carries a belt: a bar, in the belt's coordinates, px. */
   frame(group: any, from: number, to: number, y: number, thick: number) {
     if (to - from < 20 || thick < 3) return;
     group.append(svg("rect", {
@@ -288,7 +292,7 @@ class Scenery {
     }));
   }
 
-  /** Write the speed of a belt on its frame where that can be seen. */
+  /** Write the speed of a belt on its frame if the frame is large enough. */
   tell(
     group: any, from: number, to: number, y: number, thick: number, speed: number, upright = 1,
   ) {
@@ -319,7 +323,8 @@ class Scenery {
     return group;
   }
 
-  /** The incoming belt: a loop round the drive pulley and, at its other end, another like it. */
+  /** Returns the incoming belt: a loop round the drive pulley and an equal pulley at the other
+   * end. */
   incoming({ length, speed }: Segment, { pulley }: Machine) {
     const { view, thick } = this, group = svg("g", { class: "part" });
     const { radius, incline } = pulley as { radius: number, incline: number };
@@ -329,7 +334,7 @@ class Scenery {
     const loop = stadium(x - long, x, y, inner), out = inner + 0.36 * thick;
     const edge = `M${x - long} ${y - out}H${x}A${out} ${out} 0 0 1 ${x + out} ${y}`;
     const wheel = Math.max(r - thick - 1, 0.4 * r);
-    // As far to the left as is seen, so that the speed stands in sight.
+    // Begin at the left edge of the picture at most, so that the speed is visible.
     const seen = Math.max(x - long + r, -0.02 * view.width);
     if (r > 2 * thick) {
       const wide = Math.min(26, 0.6 * wheel);
@@ -341,11 +346,11 @@ class Scenery {
     return group;
   }
 
-  /** A belt without pulleys of its own: a loop below what it carries, on rollers. */
+  /** Returns a belt without pulleys: a loop on rollers, below the surface that carries. */
   belt({ x, y, tx, ty, length, speed }: Segment) {
     const { view, thick } = this, group = svg("g", { class: "part" });
     const long = length * view.scale, back = Math.abs(tx) > 1e-9 ? tx < 0 : ty < 0;
-    // Along the belt, from its left end; what it carries is above.
+    // Coordinates along the belt, from its left end; particles are above.
     const [ax, ay] = back ? [x + tx * length, y + ty * length] : [x, y];
     const angle = Math.atan2(back ? -ty : ty, back ? -tx : tx);
     const [px, py] = [view.px(ax), view.py(ay)];
@@ -366,7 +371,7 @@ class Scenery {
     const right = level ? Math.min(long, free.right - px) : long;
     const between = (right - left) / Math.max(1, Math.round((right - left) / ROLLERS));
     if (between > 90 && 2 * turn - 1.6 * thick >= 15) {
-      // Between two rollers, near the middle of what is seen.
+      // Between two rollers, near the middle of the visible part.
       const spacing = long / rollers, n = Math.round(0.5 * (left + right) / spacing - 0.5);
       const at = (n + 0.5) * spacing;
       this.tell(group, at - 80, at + 80, middle, 24, onward);
@@ -374,7 +379,7 @@ class Scenery {
     return group;
   }
 
-  /** A belt round two pulleys, which carries on both strands. */
+  /** Returns a belt round two pulleys, which carries on both strands. */
   conveyor(wheels: Arc[]) {
     const { view, thick } = this, group = svg("g", { class: "part" });
     const [a, b] = wheels, scale = view.scale;
@@ -394,7 +399,7 @@ class Scenery {
     return group;
   }
 
-  /** A whole circle that turns: a wheel, or round what is inside of it a drum. */
+  /** Returns a full turning circle: a drum if particles begin inside of it, else a wheel. */
   drum(arc: Arc, holds: boolean) {
     const { view, thick } = this, { x, y, radius, speed } = arc;
     const group = svg("g", { class: "part" });
@@ -406,7 +411,7 @@ class Scenery {
     return group;
   }
 
-  /** A bend, which may run. */
+  /** Returns an arc: a running belt if it has a speed, else a wall. */
   bend(arc: Arc) {
     const group = svg("g", { class: "part" });
     if (arc.speed) group.append(this.band(this.arcPath(arc), arc.speed));
@@ -427,7 +432,7 @@ class Scenery {
     return path;
   }
 
-  /** A plate: steel behind its struck face, which is on the left on the way up. */
+  /** Returns a plate: a face, and steel behind it (on the right, seen along the segment). */
   plate({ x, y, tx, ty, length }: Segment) {
     const { view, thick } = this, group = svg("g", { class: "part" });
     const long = length * view.scale, deep = PLATE * thick;
@@ -442,7 +447,8 @@ class Scenery {
     return group;
   }
 
-  /** A line that counts, with an arrow the way that counts on: to the right of it. */
+  /** Returns a counting line; its arrow shows the direction that counts up: to the right of the
+   * line. */
   sensor(from: [number, number], to: [number, number]) {
     const { view } = this, group = svg("g", { class: "part sensor" });
     const [x, y, u, v] = [view.px(from[0]), view.py(from[1]), view.px(to[0]), view.py(to[1])];
@@ -463,7 +469,7 @@ class Scenery {
     return group;
   }
 
-  /** An arrow across what is solid from one side, in the way in which it lets through. */
+  /** Returns an arrow across a one-sided surface, in the direction in which particles pass. */
   passage(body: Segment | Arc) {
     const { view } = this, isBent = "begin" in body, { x, y, one_sided: side } = body;
     const middle = isBent ? body.begin + 0.5 * body.extent : 0;
@@ -479,11 +485,11 @@ class Scenery {
     });
   }
 
-  /** A wall along a path, px. */
+  /** Returns a wall along a path in px. */
   line = (d: string) => svg("path", { d, class: "wall", "stroke-width": this.wide });
 }
 
-/** The way of a belt round two wheels, clockwise from the left one's top, px. */
+/** Returns the path of a belt round two wheels, clockwise from the top of the left one, px. */
 const stadium = (left: number, right: number, y: number, r: number) =>
   `M${left} ${y - r}H${right}A${r} ${r} 0 0 1 ${right} ${y + r}H${left}`
   + `A${r} ${r} 0 0 1 ${left} ${y - r}`;

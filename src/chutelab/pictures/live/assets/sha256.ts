@@ -1,7 +1,8 @@
-// SHA-256, FIPS 180-4: what browsers have of it is missing in pages from a file.
+// SHA-256 (FIPS 180-4): the browser's own is not available in pages opened from a file.
 
-/** The first 32 bits of what is behind the point, of a root of one of the first primes.
- * @param count of primes @param power of the root */
+/** The first 32 bits of the fractional parts of roots of the first primes.
+ * @param count of primes
+ * @param power of the root */
 function rootsOfPrimes(count: number, power: number) {
   const found = [];
   for (let n = 2; found.length < count; n += 1) {

@@ -1,4 +1,4 @@
-// A scene in an address, and as files.
+// Stores a scene in an address and in files.
 
 import { KNOT_ROW } from "./core.ts";
 import type { Recording } from "./recording.ts";
@@ -6,7 +6,8 @@ import type { Given } from "./scene.ts";
 
 type Rows = (string | number)[][];
 
-/** The tables in which a scene differs from the page's, as a text for an address; "" if in none. */
+/** Returns the tables in which a scene differs from the page's, as a text for an address; "" if
+ * there are none. */
 function toHash(first: Given, given: Given) {
   const changed: Record<string, unknown> = {};
   for (const table of new Set([...Object.keys(first), ...Object.keys(given)])) {
@@ -19,8 +20,8 @@ function toHash(first: Given, given: Given) {
   return `#${btoa(text).replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "")}`;
 }
 
-/** The scene that an address tells, or null if it tells none. Whether there can be such a scene is
- * what `resolve` finds. */
+/** Returns the scene stored in an address, or null if there is none. It is not checked here;
+ * `resolve` does that. */
 function fromHash(first: Given, hash: string): Given | null {
   if (hash.length < 2) return null;
   try {
@@ -44,8 +45,8 @@ function download(name: string, content: BlobPart, type: string) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-/** All knots: where each particle is and how fast, at the times between which the engine
- * computes. */
+/** Returns all knots: position and velocity of each particle at the times at which its motion
+ * changes. */
 function knotRows(recording: Recording): Rows {
   const rows: Rows = [["particle", "t [s]", "x [m]", "y [m]", "vx [m/s]", "vy [m/s]", "omega [rad/s]"]];
   recording.tracks.forEach((track, index) => {
@@ -56,20 +57,21 @@ function knotRows(recording: Recording): Rows {
   return rows;
 }
 
-/** Rows as text for a spreadsheet. Where numbers have a comma, semicolons part them. */
+/** Returns rows as text for a spreadsheet, separated by semicolons if numbers have a decimal comma.
+ */
 function toCsv(rows: Rows, comma: boolean) {
   const cell = (value: string | number) => {
     if (typeof value === "number") {
       return isFinite(value) ? String(value).replace(".", comma ? "," : ".") : "";
     }
-    // A text must not become a formula, nor break the row.
+    // A text must not become a formula or break the row.
     const tame = /^[=+@\-\t]/.test(value) ? `'${value}` : value;
     return /[",;\n]/.test(tame) ? `"${tame.replace(/"/g, '""')}"` : tame;
   };
   return rows.map((row) => row.map(cell).join(comma ? ";" : ",")).join("\r\n").concat("\r\n");
 }
 
-/** What a file of a scene is called. */
+/** Returns the name of a scene's file, without suffix. */
 const fileStem = (title: string) =>
   title.normalize("NFKD").replace(/[^\w]+/g, "-").replace(/^-+|-+$/g, "").slice(0, 60) || "scene";
 

@@ -1,4 +1,4 @@
-// The menu of what the picture shows, and by what its particles are coloured.
+// The menu that chooses what the picture shows and what the colours of particles mean.
 
 import { html, menuOf } from "./panels.ts";
 import { Legend } from "./legend.ts";
@@ -46,7 +46,7 @@ class Show {
     return text;
   }
 
-  /** What colour a particle has: what the legend says. */
+  /** Add the buttons that choose what the colours mean; the legend explains them. */
   hues() {
     const { stage, words } = this, { balls } = stage;
     const buttons = HUES.map((hue) => html("button",

@@ -1,27 +1,28 @@
-// The sound of impacts: a tap for each, louder with its impulse, higher for smaller particles.
+// The sound of impacts: taps, louder for a larger impulse, higher for smaller particles.
 
 import type { Lab } from "./lab.ts";
 import type { Words } from "./words.ts";
 
-/** Taps in a second, at most. */
+/** Most taps per second. */
 const MOST = 20;
 
-/** s that a tap takes to fade, and its pitch for a particle of 10 mm radius, Hz. */
+/** Time in which a tap fades, s; its pitch, Hz, for a particle of this radius, m. */
 const FADE = 0.09, PITCH = 900, SIZE = 0.01;
 
-/** The first and the last kind of blows, as in the enum Kind of the core. */
+/** First and last kind of event that makes a sound, from the core's enum Kind. */
 const IMPACT = 3, COLLISION = 5;
 
 class Sound {
   context: AudioContext | null = null;
   button = document.getElementById("sound") as HTMLButtonElement;
-  /** Blows in the order of time, how many events have been read, and when was listened last, s. */
+  /** Blows in the order of time, number of events read, and time up to which blows were heard, s.
+   */
   blows: { t: number, impulse: number, radius: number }[] = [];
   seen = 0;
   since = 0;
   /** The strongest blow so far, N s. */
   loudest = 0;
-  /** When the last tap was, s of the sound's own clock. */
+  /** Time of the last tap on the clock of the sound, s. */
   last = -Infinity;
 
   constructor(readonly lab: Lab, readonly words: Words) {
@@ -37,7 +38,7 @@ class Sound {
 
   toggle() {
     this.button.setAttribute("aria-pressed", String(!this.on));
-    // A browser lets a page sound only once it was asked to.
+    // Browsers allow sound only after the user has pressed something.
     this.context ??= new AudioContext();
     this.context.resume();
     this.since = this.lab.t;
@@ -51,7 +52,7 @@ class Sound {
     this.button.querySelector("use")?.setAttribute("href", this.on ? "#i-sound" : "#i-mute");
   }
 
-  /** Take in the blows that the run has added. */
+  /** Read the blows that the run has added. */
   read() {
     const { recording, machine } = this.lab;
     if (!recording || !machine) return;
@@ -67,7 +68,7 @@ class Sound {
     if (more.length) this.blows.sort((a, b) => a.t - b.t);
   }
 
-  /** Tap for the strongest blow since the last frame, if time goes on. */
+  /** Tap for the strongest blow since the last frame, while the run is played. */
   listen() {
     const { lab: { t, playing }, since } = this;
     this.since = t;
@@ -83,7 +84,7 @@ class Sound {
     const context = this.context as AudioContext, now = context.currentTime;
     if (now - this.last < 1 / MOST) return;
     this.last = now;
-    // Loudness is heard as its logarithm: a hundredth of the strongest is just to be heard.
+    // The ear hears the logarithm: a blow of a hundredth of the strongest is silent.
     const loud = Math.max(0, 1 + Math.log10(impulse / this.loudest) / 2);
     if (!loud) return;
     const gain = new GainNode(context, { gain: 0.3 * loud });

@@ -1,4 +1,4 @@
-// The picture: surfaces, tracks and handles as SVG, particles on a canvas between them.
+// The picture: surfaces, tracks and handles in SVG, particles on a canvas between them.
 
 import { openHandles } from "./controls.ts";
 import { drawOutline, freePlace } from "./callout.ts";
@@ -16,31 +16,31 @@ import type { Lab } from "./lab.ts";
 import type { Recording } from "./recording.ts";
 import type { Words } from "./words.ts";
 
-/** Tracks that are drawn at most; more are a blot. */
+/** Most tracks drawn; more could not be told apart. */
 const MOST_TRACKS = 40;
 
-/** Pixels from an end to the handle that turns it. */
+/** Distance from an end to the handle that turns it, px. */
 const BEYOND = 38;
 
-/** Angles to which one is drawn that is so near, degrees. */
+/** An angle within NEARLY of a multiple of ROUND snaps to it, degrees. */
 const ROUND = 15, NEARLY = 1.5;
 
 type Point = [number, number];
 
-/** Pixels of radius that a particle has at least, and where there are few, which one looks for. */
+/** Least drawn radius of a particle, px, and where there are few, so that they are easily found. */
 const LEAST = 1.2, LEAST_FEW = 3;
 
-/** Pixels of radius from which on a particle shows how it turns. */
+/** Least radius, px, at which a particle shows its rotation. */
 const SPUN = 8;
 
-/** By how much a line that is drawn may miss the track: pixels, and before there are any, the share
- * of the machine. */
+/** Most distance of a drawn line from the true track, px; as a share of the machine's size while
+ * the scale is not yet known. */
 const FINE = 0.2, FINE_SHARE = 1e-3;
 
-/** Instants at which is looked how far what moves goes. */
+/** Number of times at which moving parts are looked at for the view. */
 const POSES = 64;
 
-/** Height of the text over the bar that tells the scale, px. */
+/** Height of the text above the scale bar, px. */
 const ABOVE = 24;
 
 class Stage {
@@ -57,10 +57,10 @@ class Stage {
   handles: Handle[] = [];
   gripOf: Map<string, any> = new Map();
   held: Handle | null = null;
-  /** The parts that are chosen; of one the handles are seen. */
+  /** Selected parts; a single one shows its handles. */
   parts: string[] = [];
-  /** What is held as it was before, what is chosen and what is pointed at, and what a place that is
-   * dragged was drawn to. */
+  /** `ghost` is what is dragged, as it was before; `outline` marks selected and pointed parts;
+   * `magnet` marks the point to which a dragged one has snapped. */
   ghost = svg("g", { class: "surfaces ghost" });
   outline = svg("g", { class: "outline" });
   magnet = svg("circle", { class: "magnet", r: 9 });
@@ -88,7 +88,7 @@ class Stage {
       if (this.held && this.at) this.tell(this.at);
     }).observe(this.tip);
     this.grips = svg("g", { class: "grips" });
-    /** Further layers, of tools, lie below the handles. */
+    /** Layers of the tools, below the handles. */
     this.over = svg("g", { class: "over" });
     this.front.append(this.over, this.magnet, this.grips);
     new ResizeObserver(() => this.resize()).observe(home);
@@ -104,7 +104,8 @@ class Stage {
     this.resize();
   }
 
-  /** A page in a frame that is hidden has no size yet: all is drawn once it has one. */
+  /** Adapt to the size of the page. A page in a hidden frame has none; it is drawn once it has
+   * one. */
   resize() {
     const { clientWidth: width, clientHeight: height } = this.home;
     if (!width || !height) return;
@@ -115,7 +116,7 @@ class Stage {
       left: inset("left"), top: inset("top") + this.strip, right: width - inset("right"),
       bottom: height - inset("bottom"),
     };
-    // In a lesson it stands above, where no belt is.
+    // In a lesson the scale bar is at the top, where no belt is.
     const low = style.getPropertyValue("--scale-at") ? height - 44
       : inset("bottom") + 20;
     this.corner = [inset("left") + 24, height - low];
@@ -129,10 +130,10 @@ class Stage {
     else this.rebuild();
   }
 
-  /** Whether what is to be predicted of the run is still hidden. */
+  /** Whether the run is hidden because the student is to predict it first. */
   blind = false;
 
-  /** Whether the user has chosen what is shown. */
+  /** Whether the user has moved or zoomed the view. */
   moved = false;
 
   fit() {
@@ -152,13 +153,13 @@ class Stage {
     this.rebuild();
   }
 
-  /** The machine as it is at the time that is shown. */
+  /** The machine at the shown time. */
   get posed() {
     const { machine, recording, t } = this.lab;
     return machine && (recording?.machine === machine ? recording.posed(t) : machine);
   }
 
-  /** Places that ends of what moves go through, as far as the run has come, m. */
+  /** Points passed by the ends of moving parts in the run so far, m. */
   get swept(): Point[] {
     const { machine, recording } = this.lab;
     if (!machine?.movers.length || !recording) return [];
@@ -173,7 +174,7 @@ class Stage {
       ]);
   }
 
-  /** `[view]` of the scene that is shown, as text. */
+  /** `[view]` of the shown scene, as text. */
   chosen: string | undefined;
 
   /** @param fine m */
@@ -182,7 +183,7 @@ class Stage {
     return shown.map((_, i) => recording.points(i, fine));
   }
 
-  /** The run has come on: its tracks, and the first view once there is one. */
+  /** More of the run is there: draw its tracks, and fit the first view when the run has ended. */
   traced() {
     const { recording } = this.lab;
     if (recording && !this.fitted && recording.state !== "running") this.fit();
@@ -193,44 +194,44 @@ class Stage {
     }
     if (this.lab.playing && recording?.machine.interact) this.drawPaths();
     else this.drawTracks();
-    // While it plays, the time brings the next picture.
+    // While it is played, the next frame paints anyway.
     if (!this.lab.playing) this.paint();
     for (const draw of this.drawers) draw();
   }
 
-  /** The lower left corner of the free part, and of the bar that tells the scale, px; and how long
-   * that is. */
+  /** The lower left corners of the free part and of the scale bar, and the bar's length, px. */
   corner: Point = [24, 0];
   scaleAt: Point = this.corner;
   long = 0;
 
-  /** What the bar of the scale covers, with its text, and the legend, px. */
+  /** The box of the scale bar with its text, px; `legend` is that of the legend. */
   get scaleBox() {
     const [left, bottom] = this.scaleAt;
     return { left, right: left + this.long, top: bottom - ABOVE, bottom };
   }
 
   legend: Stage["frame"] = null;
-  /** Height of a strip that is kept free of the machine at the top, where else the legend has no
-   * place, px. */
+  /** Height of a strip at the top that is kept free of the machine if the legend fits nowhere else,
+   * px. */
   strip = 0;
 
-  /** Keep a strip free, or no longer. */
+  /** Keep a strip of this height free at the top; 0 for none. */
   keepFree(strip: number) {
     this.strip = strip;
     this.resize();
   }
 
-  /** Boxes of the labels that stand in the picture, px. */
+  /** Boxes of the labels in the picture, px. */
   labels: { left: number, right: number, top: number, bottom: number }[] = [];
 
-  /** What tools draw anew when the view, the machine or its run has changed. */
+  /** Functions of the tools that draw anew when the view, the machine or its run has changed. */
   drawers: (() => void)[] = [];
 
-  /** Of a rebuild that waits for the run, if that comes within a frame; 0 where none does. */
+  /** The requested frame of a rebuild that waits for the run; 0 if none does. */
   soon = 0;
 
-  /** What is dragged is painted once a frame, with its run, which else would be gone meanwhile. */
+  /** Rebuild in the next frame, together with the new run: without waiting, the run would
+   * flicker. */
   rebuildSoon() {
     this.placeHandles();
     this.soon ||= requestAnimationFrame(() => this.rebuild());
@@ -243,7 +244,7 @@ class Stage {
     const { machine, scene } = this.lab;
     if (machine) this.scenery.draw(machine, scene);
     this.long = this.view.mesh * this.view.scale;
-    // Under what is dragged it stays.
+    // The scale bar does not move during a drag.
     if (!this.held) this.scaleAt = freePlace(this, [this.long, ABOVE], this.corner) ?? this.corner;
     this.scenery.drawGround(...this.scaleAt);
     this.drawTracks();
@@ -252,7 +253,7 @@ class Stage {
     for (const draw of this.drawers) draw();
   }
 
-  /** Those of a crowd that is played, which change little from frame to frame. */
+  /** Draw tracks only now and then: while a crowd is played they change little between frames. */
   drawPaths = eased(() => this.drawTracks(), () => CALM);
 
   drawTracks() {
@@ -262,7 +263,8 @@ class Stage {
     const { envelopes = [] } = historyOf(this.lab) ?? {};
     for (const { stream, lines } of envelopes) this.drawEnvelope(stream, lines);
     if (envelopes.length) return;
-    // The run is a line within the two of the calculated one, as long as they agree.
+    // The calculated flight is a double line; the run lies inside of it as long as the two
+    // agree.
     const at = ([x, y]: Point) => `${view.px(x).toFixed(1)} ${view.py(y).toFixed(1)}`;
     const d = this.calculated.map(([from, bend, to]) => `M${at(from)}Q${at(bend)} ${at(to)}`).join("");
     if (d) this.paths.append(svg("path", { d, class: "rail" }), svg("path", { d, class: "rail within" }));
@@ -273,8 +275,8 @@ class Stage {
     }
   }
 
-  /** The calculated flights to the plate and from there to the belt, m: where each begins and ends,
-   * and between them where the tangents there meet, which is all that a parabola is. */
+  /** The calculated flights to the plate and from there to the belt, as control points of quadratic
+   * Bézier curves, m: beginning, intersection of the tangents at both ends, end. */
   get calculated(): [Point, Point, Point][] {
     const { scene, recording } = this.lab, belt = scene?.incoming;
     if (!belt || !recording || recording.machine.interact) return [];
@@ -288,9 +290,9 @@ class Stage {
     return flights.filter((flight) => flight.flat().every(isFinite));
   }
 
-  /** Lines of an envelope: the band between the outer two, and the middle one. Where the way turns
-   * sharply, as at its end where half have come to lie, cuts across it cross each other: of these
-   * only the first is drawn.
+  /** Draw an envelope: the band between its outer lines, and its middle line. Where the path turns
+   * sharply, for instance at its end where half of the particles have come to rest, neighbouring
+   * cross-sections intersect: of these only the first is drawn.
    * @param lines m */
   drawEnvelope(stream: number, lines: [number, number][][]) {
     const { view } = this, cuts: Point[][] = [];
@@ -317,13 +319,13 @@ class Stage {
     return (this.lab.recording?.tracks.length ?? 0) <= MOST_TRACKS ? LEAST_FEW : LEAST;
   }
 
-  /** Whether particles are drawn larger than they are. */
+  /** Whether some particles are drawn larger than they are. */
   get isLarger() {
     const { machine } = this.lab;
     return machine?.radius.some((radius) => radius * this.view.scale < this.least) ?? false;
   }
 
-  /** Particles, and what moves. */
+  /** Paint the particles, and bring moving parts to the shown time. */
   paint() {
     const { lab, view, canvas } = this;
     const { recording, machine, t } = lab;
@@ -333,7 +335,7 @@ class Stage {
     context.setTransform(dense, 0, 0, dense, 0, 0);
     context.clearRect(0, 0, view.width, view.height);
     this.scenery.turn(t, recording.swings);
-    // Dashes round particles and joints go with them.
+    // The outlines of particles and joints move with them.
     if (this.parts.length || this.pointed) this.drawOutline();
     const { least } = this;
     if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context);
@@ -357,7 +359,7 @@ class Stage {
       }
       this.balls.paint(context, i, x, y, r, speed);
       if (!spins || r < SPUN) continue;
-      // A radius shows how it turns.
+      // A line from the centre shows the rotation.
       marks.moveTo(x, y);
       marks.lineTo(x + r * Math.cos(angle), y - r * Math.sin(angle));
     }
@@ -368,16 +370,16 @@ class Stage {
     for (const draw of this.painters) draw(context);
   }
 
-  /** Further things that are painted over the particles. */
+  /** Functions that paint over the particles. */
   painters: ((context: CanvasRenderingContext2D) => void)[] = [];
 
-  /** Light has become dark, or the other way. */
+  /** The theme has changed between light and dark. */
   recolour() {
     this.colours.clear();
     this.paint();
   }
 
-  /** A colour of page.css, of the theme that is on. */
+  /** Returns a colour of page.css in the present theme. */
   colour(name: string) {
     const known = this.colours.get(name)
       ?? getComputedStyle(this.home).getPropertyValue(`--${name}`);
@@ -385,10 +387,10 @@ class Stage {
     return known;
   }
 
-  /** To ask for each takes longer than to paint a particle. */
+  /** Colours by name, kept because asking the browser takes longer than painting a particle. */
   colours: Map<string, string> = new Map();
 
-  /** Dots at round times on the first tracks. */
+  /** Paint dots at round times on the first track. */
   strobe(context: CanvasRenderingContext2D) {
     const { recording } = this.lab;
     if (!recording) return;
@@ -405,7 +407,7 @@ class Stage {
     }
   }
 
-  /** A round time, s, that gives a track some twenty dots. */
+  /** A round interval, s, that gives the first track about twenty dots. */
   get strobeStep() {
     const track = this.lab.recording?.tracks[0];
     const span = track?.count ? track.end - track.begin : 1;
@@ -423,7 +425,7 @@ class Stage {
     const wanted = new Set(this.handles.map(({ id }) => id));
     for (const [id, grip] of this.gripOf) {
       if (wanted.has(id)) continue;
-      // Where its focus went to, the space bar plays as it does on a handle.
+      // Focus the play button: the space bar plays there as it did on the handle.
       if (grip === document.activeElement) document.getElementById("play")?.focus();
       grip.remove();
       this.gripOf.delete(id);
@@ -431,13 +433,13 @@ class Stage {
     for (const handle of this.handles) {
       const grip = this.gripOf.get(handle.id) ?? this.newGrip(handle.id);
       this.describe(grip, handle);
-      // Put in anew it would lose the focus.
+      // Inserting it again would take its focus.
       if (!grip.isConnected) this.grips.append(grip);
     }
     this.drawOutline();
   }
 
-  /** Choose parts. */
+  /** Select parts. */
   choose(parts: string[]) {
     this.parts = parts;
     for (const handle of this.handles) {
@@ -446,25 +448,25 @@ class Stage {
     this.drawOutline();
   }
 
-  /** A handle is seen while its part alone is chosen, one of a tool always. */
+  /** Returns whether a handle is shown: its part is the only selected one, or it is a tool's. */
   isSeen({ surface, change }: Handle) {
     return change !== undefined || (this.parts.length === 1 && this.parts[0] === surface);
   }
 
-  /** Boxes on the picture that labels keep clear of, px. */
+  /** Boxes that labels avoid, px. */
   covered: { left: number, right: number, top: number, bottom: number }[] = [];
 
-  /** What the pointer is over. */
+  /** The part under the pointer. */
   pointed = "";
 
-  /** The frame round several that are chosen, px. */
+  /** The frame round several selected parts, px. */
   frame: { left: number, right: number, top: number, bottom: number } | null = null;
 
   drawOutline() {
     drawOutline(this);
   }
 
-  /** Handles of tools. */
+  /** Functions that return handles of tools. */
   further: (() => Handle[])[] = [];
 
   newGrip(id: string) {
@@ -492,7 +494,7 @@ class Stage {
     const values = handle.says ? [handle.says]
       : handle.axes.filter(({ step }) => step).map((axis) => words.value(axis));
     set(grip, "aria-label", name);
-    // Such an attribute has no exponent: a bound above 0 may be the least number that is.
+    // The attribute allows no exponent, and a bound above 0 may be the smallest number there is.
     const plain = (value: number) => String(Math.round(1e6 * value) / 1e6);
     set(grip, "aria-valuenow", plain(first.value));
     set(grip, "aria-valuetext", values.join(", "));
@@ -505,7 +507,7 @@ class Stage {
     this.front.addEventListener("pointerdown", (event: PointerEvent) => {
       const grip = (event.target as Element).closest(".grip");
       if (!grip) return;
-      // Of several within reach the nearest is meant.
+      // Take the nearest of several handles within reach.
       const [px, py] = this.placeOf(event), { view } = this;
       const far = ({ x, y }: Handle) => Math.hypot(view.px(x) - px, view.py(y) - py);
       const [meant] = this.handles.filter((one) => this.isSeen(one)
@@ -530,20 +532,20 @@ class Stage {
     });
   }
 
-  /** Have what is held follow the pointer. */
+  /** Let the held handle follow the pointer. */
   aim(event: PointerEvent) {
     if (!this.held) return;
     this.latest = this.placeOf(event);
     this.loose = event.altKey;
     this.finger = event.pointerType === "touch";
-    // More events than frames come: the latest counts.
+    // There may be several events per frame: use the latest.
     if (!this.waiting) this.waiting = requestAnimationFrame(() => this.follow());
   }
 
-  /** Where the pointer has moved since the last frame, px. */
+  /** Where the pointer is, if it has moved since the last frame, px. */
   latest: Point | undefined;
 
-  /** Whether places are drawn to nothing, and whether a finger holds them. */
+  /** Whether snapping is off (Alt), and whether a finger drags. */
   loose = false;
   finger = false;
 
@@ -561,7 +563,7 @@ class Stage {
     this.latest = undefined;
   }
 
-  /** Take hold of a handle. */
+  /** Take hold of a handle by its id. */
   take(id: string) {
     const handle = this.handles.find((one) => one.id === id);
     if (!handle) return null;
@@ -569,7 +571,7 @@ class Stage {
     return this.hold(handle);
   }
 
-  /** Hold a handle, or a body. Where it was stays to be seen. */
+  /** Hold a handle or a body, and show where it was as a ghost. */
   hold(handle: Handle): Handle {
     this.held = handle;
     if (handle.change) return handle;
@@ -582,11 +584,11 @@ class Stage {
     return handle;
   }
 
-  /** Ends of other parts, m; and what the values of what is held were. */
+  /** Ends of other parts, m; and the values of the held handle before the drag, as text. */
   ends: Point[] = [];
   was = "";
 
-  /** Move what is held to a place, px. */
+  /** Move the held handle to a point, px. */
   dragTo(at: Point) {
     const { held, view } = this;
     if (!held) return;
@@ -624,7 +626,8 @@ class Stage {
     this.tell(at);
   }
 
-  /** How far a body goes: so that one of its ends meets one of another part, or by round steps. */
+  /** Returns how far to move a body: until one of its ends meets an end of another part, else by
+   * round steps. */
   shiftOf({ x, y, places = [] }: Handle, at: Point): { way: Point, caught: Point | null } {
     const { view } = this, [dx, dy] = [view.worldX(at[0]) - x, view.worldY(at[1]) - y];
     for (const [px, py] of this.loose ? [] : places) {
@@ -637,11 +640,11 @@ class Stage {
     return { way: [roundTo(dx, view.snap), roundTo(dy, view.snap)], caught: null };
   }
 
-  /** Width and height of what is told, px; and where it was told. */
+  /** Width and height of the text beside the pointer, px, and the pointer when it was written. */
   tipSize: Point = [0, 0];
   at?: Point;
 
-  /** The value that is changed, beside the pointer; or why it cannot be. */
+  /** Write the changed value beside the pointer, or why it is refused. */
   tell(at: Point) {
     const [px, py] = this.at = at;
     const { lab, words, held, view, tip } = this;
@@ -652,9 +655,9 @@ class Stage {
     tip.replaceChildren(...(lab.fault ? [words.fault(lab.fault)] : [
       html("b", {}, words.values(now.axes)), html("span", {}, words.say("was", { value: this.was })),
     ]));
-    // To ask for the size now would have all laid out once more.
+    // Asking for the size here would force another layout.
     const [wide, high] = this.tipSize;
-    // A finger hides what is below it.
+    // Put it above a finger, which hides what is below.
     const left = Math.min(px + 22, view.width - wide - 8), over = this.finger ? -high - 40 : 26;
     const top = Math.min(Math.max(py + over, 8), view.height - high - 8);
     tip.style.transform = `translate(${Math.max(8, left)}px, ${top}px)`;
@@ -695,14 +698,14 @@ class Stage {
   }
 }
 
-/** Whether two straight lines from point to point cross. */
+/** Returns whether the lines from `a` to `b` and from `c` to `d` intersect. */
 function cross(a: Point, b: Point, c: Point, d: Point) {
   const side = ([px, py]: Point, [qx, qy]: Point, [x, y]: Point) =>
     Math.sign((qx - px) * (y - py) - (qy - py) * (x - px));
   return side(a, b, c) !== side(a, b, d) && side(c, d, a) !== side(c, d, b);
 }
 
-/** How plates and wheels shine. */
+/** Returns the gradient of plates and wheels. */
 function steel() {
   return svg("defs", {}, svg("linearGradient", { id: "steel", x1: 0, y1: 0, x2: 1, y2: 1 },
     svg("stop", { offset: 0, class: "steel-a" }), svg("stop", { offset: 1, class: "steel-b" })));

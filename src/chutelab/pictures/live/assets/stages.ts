@@ -1,4 +1,4 @@
-// What has happened to each particle, kept as the events of a run come in.
+// What has happened to each particle: kept up to date as the events of a run arrive.
 
 import { Arrivals } from "./arrival.ts";
 import { FEWEST, countUntil } from "./crowd.ts";
@@ -15,10 +15,10 @@ type Blow = { t: number, x: number, y: number, px: number, py: number };
 
 const STAGE = { separation: 1, impact: 3, landing: 4, collision: 5 };
 
-/** By how much longer a run has to be for its envelopes to be made anew. */
+/** Factor by which a run must have grown before its envelopes are computed again. */
 const LONGER = 1.2;
 
-/** The name of the plate that the paper's numbers are about. */
+/** Returns the name of the plate to which the paper's numbers belong. */
 const plateName = ({ plates }: Scene) => (plates[0]?.pivot && plates[0].name) || "plate";
 
 class RunHistory {
@@ -34,10 +34,10 @@ class RunHistory {
   largestBlow = 0;
   arrivals;
   state;
-  /** s from which on envelopes are made anew. */
+  /** Time of the run after which envelopes are computed again, s. */
   enveloped = -Infinity;
 
-  /** @param plate its name */
+  /** @param plate name of the plate for `hit` */
   constructor(readonly recording: Recording, plate: string) {
     this.events = recording.events;
     this.target = recording.machine.surfaces.indexOf(plate);
@@ -47,13 +47,13 @@ class RunHistory {
     this.update();
   }
 
-  /** Whether it is of this run, and nothing has been forgotten of it since. */
+  /** Returns whether this is the history of this run, and the run has not been reset since. */
   isOf(recording: Recording) {
     return this.recording === recording && this.events === recording.events
       && this.stages.length === recording.machine.releases.length;
   }
 
-  /** The envelopes of the streams, as far as the run has come. */
+  /** The envelopes of the streams in the run so far. */
   get envelopes() {
     const { recording, arrivals } = this, { now, begin, state } = recording;
     const t = state === "running" ? now : Infinity;
@@ -67,16 +67,16 @@ class RunHistory {
 
   paths: Envelope[] = [];
 
-  /** Take in what is new. */
+  /** Read new events. */
   update() {
     const { events, recording } = this, begin = this.seen;
-    // At the end the whole run is looked at, as in Python.
+    // When the run ends, search all of it again, as Python does.
     if (recording.state === this.state) this.arrivals.update();
     else this.arrivals = new Arrivals(recording);
     this.state = recording.state;
     for (; this.seen < events.length; this.seen += 1) this.add(events[this.seen]);
     if (begin === this.seen) return;
-    // Particles that do not meet are run one after the other.
+    // Particles that do not meet are run one after another, so events are not in order.
     this.landings.sort((a, b) => a.t - b.t);
     this.blows.sort((a, b) => a.t - b.t);
   }
@@ -97,14 +97,14 @@ class RunHistory {
     }
   }
 
-  /** Impacts after one time, up to another. @param to s */
+  /** Returns impacts after one time, up to another. @param to s */
   blowsBetween = (from: number, to: number) =>
     this.blows.slice(countUntil(this.blows, from), countUntil(this.blows, to));
 }
 
 let latest: RunHistory | undefined;
 
-/** The history of a lab's run as it is now; all that show it share it. */
+/** Returns the up-to-date history of a lab's run, shared by all that show it. */
 function historyOf({ recording, scene }: Lab) {
   if (!recording || !scene) return null;
   if (latest?.isOf(recording)) latest.update();

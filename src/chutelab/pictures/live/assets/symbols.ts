@@ -1,5 +1,5 @@
-// The paper's symbols in the picture, at what they stand for: angle, speeds, times and lengths of
-// the first particle's transfer.
+// The paper's symbols in the picture, each at what it stands for: angle, speeds, times and
+// lengths of the first particle's transfer.
 
 import { passed, surfaceLines } from "./callout.ts";
 import { historyOf } from "./stages.ts";
@@ -7,29 +7,29 @@ import { svg } from "./scenery.ts";
 import type { Stage } from "./stage.ts";
 import type { Event } from "./core.ts";
 
-/** Its middle, px, and the side of its point that is tried first, rad counterclockwise from the
- * right; one that is asked for may be far away. Its text is the longest of its rows, and `drawn` is
- * what is drawn with it, of which no label may lie on a `line` */
+/** A label at its point, later its middle, px. `side` is the direction tried first, rad
+ * counterclockwise from the right; one that is `asked` for may be far away. `text` is the longest
+ * of its rows; `drawn` is drawn with it, and no label may lie on its `line` */
 type Label = { text: string, x: number, y: number, side?: number, asked?: boolean,
   rows?: number, id?: string, drawn?: Element[], line?: [number, number][] };
-/** Where a label stands, and if that is away from its point, the line to it. */
+/** A placed label, and the point from which a line leads to it if it is far away. */
 type Placed = Label & { from?: [number, number] };
 type Space = { left: number, top: number, right: number, bottom: number };
 
-/** Height of a letter and width of one, px. */
+/** Height and width of a letter, px. */
 const TALL = 18, WIDE = 9;
 
-/** A label's distance from its point, px, in the order in which they are tried; and from where on a
- * line leads to it. */
+/** Distances of a label from its point, in the order in which they are tried, and the distance from
+ * which a line leads to it, px. */
 const AWAY = [15, 24, 34, 46, 60], FARTHER = [80, 110, 150, 200], LED = 30;
 
-/** Pixels from a point on within which lines that lead from it may lie on each other. */
+/** Distance from a point within which lines that lead from it may overlap, px. */
 const OPEN = 13;
 
-/** Pixels from one of the boxes to the next that stand for a line, and half the size of one. */
+/** Distance between the boxes that stand for a line, and half their size, px. */
 const ALONG = 9, THIN = 5;
 
-/** An angle that is smaller is not drawn, rad. */
+/** The smallest angle that is drawn, rad. */
 const LEAST_ANGLE = 0.03;
 
 const overlap = (a: Space, b: Space) =>
@@ -40,7 +40,7 @@ function spaceOf({ text, x, y, rows = 1 }: Label): Space {
   return { left: x - half, right: x + half, top: y - high, bottom: y + high };
 }
 
-/** Where a line from a point to a label ends: just outside of its text. */
+/** Returns where the line from a point to a label ends: just outside of its text. */
 function leadTo(label: Label, [x, y]: [number, number]): [number, number] {
   const { right, bottom } = spaceOf(label), [u, v] = [label.x - x, label.y - y];
   const inside = Math.min((right - label.x + 2) / Math.abs(u || 1e-9),
@@ -48,9 +48,9 @@ function leadTo(label: Label, [x, y]: [number, number]): [number, number] {
   return [label.x - inside * u, label.y - inside * v];
 }
 
-/** Labels near their points, each where nothing is yet; what has no place is left out.
- * @param wanted at their points, the most important first
- * @param most that are placed */
+/** Returns labels near their points, in free places; those without a free place are left out.
+ * @param wanted labels at their points, the most important first
+ * @param most number of labels that are placed */
 function placed(wanted: Label[], taken: Space[], most = Infinity): Placed[] {
   const spaces = [...taken], found: Placed[] = [];
   const meets = (space: Space, all: Space[]) => all.some((other) => overlap(other, space));
@@ -63,11 +63,11 @@ function placed(wanted: Label[], taken: Space[], most = Infinity): Placed[] {
     const { text, x, y, side = Math.PI / 4, asked, rows = 1, line = [] } = label;
     const labels = spaces.slice(taken.length), own = along(line);
     if (own.some((one) => meets(one, labels))) return [];
-    // Of a block the nearest edge is as far away as a letter's.
+    // The nearest edge of a block of several rows is as far away as that of one letter.
     const [wide, high] = rows > 1 ? [0.5 * WIDE * text.length, 0.5 * TALL * (rows - 1)] : [0, 0];
     for (const far of asked ? [...AWAY, ...FARTHER] : AWAY) {
       for (let n = 0; n < 8; n += 1) {
-        // The side that is wanted, then those next to it.
+        // Try the wanted side first, then its neighbours.
         const turn = (n % 2 ? -1 : 1) * Math.ceil(n / 2), angle = side + (turn * Math.PI) / 4;
         const [c, s] = [Math.cos(angle), Math.sin(angle)];
         const at = { ...label, x: x + (far + wide) * c, y: y - (far + high) * s };
@@ -77,7 +77,7 @@ function placed(wanted: Label[], taken: Space[], most = Infinity): Placed[] {
           spaces.push(space, ...own);
           return [at];
         }
-        // The line to it goes through no label, and none comes on it later.
+        // The line to it must not cross a label, and no later label may lie on it.
         const lead = along([[x + OPEN * c, y - OPEN * s], leadTo(at, [x, y])]);
         if (lead.some((one) => meets(one, labels))) continue;
         spaces.push(space, ...own, ...lead);
@@ -88,14 +88,14 @@ function placed(wanted: Label[], taken: Space[], most = Infinity): Placed[] {
   }
 }
 
-/** Boxes that fill a disc, px. */
+/** Returns boxes that fill a disc, px. */
 const discs = (x: number, y: number, r: number): Space[] => [[1, 0.4], [0.8, 0.7], [0.4, 1]]
   .map(([u, v]) => ({ left: x - u * r, right: x + u * r, top: y - v * r, bottom: y + v * r }));
 
-/** Lines that labels keep clear of; more are a board of pegs. */
+/** Most surfaces that labels avoid: a board of pegs has more. */
 const MOST_LINES = 100;
 
-/** Boxes along a line through points, px. */
+/** Returns boxes along a line through points, px. */
 function along(points: [number, number][]): Space[] {
   return points.slice(1).flatMap(([x, y], i) => {
     const [u, v] = points[i], parts = Math.ceil(Math.hypot(x - u, y - v) / ALONG);
@@ -106,11 +106,11 @@ function along(points: [number, number][]): Space[] {
   });
 }
 
-/** Labels in the picture at most, and which come first. */
+/** Most labels in the picture, and their order of importance. */
 const MOST_LABELS = 6, ORDER = ["phi1_deg", "v1", "v2", "v2r", "x3", "v3", "d3", "y3", "t2", "t3"];
 
-/** What labels keep clear of: cards, the scale, the legend, handles, speeds on belts, the path of a
- * lone particle or where a crowd comes, and the surfaces, as far as they are seen. */
+/** Returns the boxes that labels avoid: cards, scale bar, legend, handles, speeds on belts, the
+ * path of a single particle or the places that a crowd passes, and visible surfaces. */
 function takenBy(stage: Stage): Space[] {
   const { view, view: { free }, lab: { recording, machine } } = stage;
   const all = { left: -1e9, right: 1e9, top: -1e9, bottom: 1e9 };
@@ -130,7 +130,7 @@ function takenBy(stage: Stage): Space[] {
       ({ left: x - THIN, right: x + THIN, top: y - THIN, bottom: y + THIN })) : []),
     ...(machine?.pulley
       ? discs(view.px(0), view.py(0), machine.pulley.radius * view.scale) : []),
-    // A board of pegs has no room between them.
+    // On a board of pegs there would be no room left.
     ...surfaceLines(stage).slice(0, MOST_LINES).flatMap(([, line]) => along(line)),
     ...stage.handles.map(({ x, y }) => {
       const [px, py] = [view.px(x), view.py(y)];
@@ -151,7 +151,7 @@ class Symbols {
 
   shown = true;
 
-  /** The quantity whose number is pointed at: it comes first, with its value. */
+  /** The quantity whose number is under the pointer: it is placed first, with its value. */
   pointed = "";
 
   point({ target }: PointerEvent) {
@@ -208,7 +208,7 @@ class Symbols {
 
   wanted: Label[] = [];
 
-  /** Ask for the label of a quantity at a point, px.
+  /** Request the label of a quantity at a point, px.
    * @param drawn what is drawn with it */
   want(
     id: string, x: number, y: number, side: number, drawn: Element[] = [],
@@ -225,7 +225,7 @@ class Symbols {
   }
 
   /** @param y m
-   * @param way from the point to its label */
+   * @param way direction from the point to its label */
   label(id: string, x: number, y: number, way: number[] = [1, 1]) {
     const { view } = this.stage;
     this.want(id, view.px(x), view.py(y), Math.atan2(way[1], way[0]));
@@ -236,13 +236,13 @@ class Symbols {
     this.layer.append(svg("circle", { cx: view.px(x), cy: view.py(y), r: 3 }));
   }
 
-  /** Where the particle leaves, and the angle of that from the top of the pulley. */
+  /** Mark where the particle leaves the pulley, and the angle of that point from the top. */
   separation(left: Event) {
     const { view } = this.stage;
     const far = Math.hypot(left.x, left.y), angle = Math.atan2(left.x, left.y);
     this.dot(left);
     if (angle < LEAST_ANGLE) {
-      // It leaves at the top: one label says both, unless one of the two is asked for.
+      // It leaves at the top: one label for speed and angle, unless one of them is pointed at.
       const id = this.pointed === "phi1_deg" ? "phi1_deg" : "v1";
       this.label(id, left.x, left.y, [0, 1]);
       if (this.pointed !== id) this.wanted[this.wanted.length - 1].text += ", φ₁ = 0";
@@ -259,16 +259,17 @@ class Symbols {
     this.label("phi1_deg", r * way[0], r * way[1], way);
   }
 
-  /** A name at the middle of a flight. */
+  /** Request a label at the middle of a flight. */
   flight(id: string, from: Event, to: Event) {
     const { recording } = this.stage.lab;
     const state = recording?.tracks[0].state(0.5 * (from.t + to.t));
     if (state) this.label(id, state.x, state.y);
   }
 
-  /** A length, upright or level, between the tips of two arrows.
-   * @param from px @param to px
-   * @param points px: where the lines from the ends to what is measured begin */
+  /** Request a vertical or horizontal length between two arrow tips.
+   * @param from px
+   * @param to px
+   * @param points where the lines to the measured points begin, px */
   measure(id: string, from: [number, number], to: [number, number], points: number[]) {
     const level = from[1] === to[1];
     if (Math.hypot(to[0] - from[0], to[1] - from[1]) < 6) return;

@@ -1,30 +1,30 @@
-// One lesson's exercise for one student, and how far that got: as Python's `Task`.
+// One lesson's exercise for one student, and the student's progress, as Python's `Task`.
 
 import { Case, drawnFor, plainName, worded, type Exercise, type DrawnNumbers } from "./draw.ts";
 import { judge, readTyped, withUnit, type Reply, type Verdict } from "./judging.ts";
 
-/** Of one question: what became of the last answer, the last number that was checked, how many
- * answers, how many hints were read, whether the working was shown */
+/** Progress with one question: verdict on the last answer, last number checked, number of answers
+ * and of hints read, whether the working was shown */
 type Standing = { verdict: Verdict, answer: number | null, tries: number, hints: number,
   revealed: boolean };
-/** What is handed in */
+/** The result that is handed in */
 type Result = { chutelab_result: 1, lesson: string, student: string, answers: Record<string,
   number>, tries: Record<string, number>, hints: Record<string, number>, revealed: number[],
   words: Record<string, string>, language: string };
 
-/** Characters of a name, and of an explanation. */
+/** Most characters of a name, and of an explanation. */
 const LONGEST_NAME = 200, LONGEST_WORDS = 1500;
 
 class Task {
   numbers;
-  /** Numbers of other names, as they are looked up. */
+  /** Numbers drawn for other names, kept as they are needed. */
   theirs: Map<string, DrawnNumbers> = new Map();
   explained = "";
-  /** Right answers that a machine gave, by question from 0 on. */
+  /** Right answers measured with a machine, by question, from 0. */
   measured: Map<number, number> = new Map();
   standings: Standing[];
 
-  /** @param names of others who have been here */
+  /** @param names returns the names of others who have used this page */
   constructor(
     readonly exercise: Exercise, readonly student: string,
     readonly names: () => Iterable<string> = () => [],
@@ -48,12 +48,13 @@ class Task {
     return this.numbers.text(this.exercise.story);
   }
 
-  /** A question from 0 on; what is right is worked out for a reply, and forgotten. */
+  /** Returns a question (from 0) with its numbers. The right answer is computed when needed, not
+   * stored. */
   case(n: number) {
     return new Case(this.exercise.questions[n], this.numbers, this.measured.get(n));
   }
 
-  /** What a question asks, and in which unit. */
+  /** Returns the texts of a question, with the unit of its answer. */
   asked(n: number) {
     const { title, text, unit } = this.exercise.questions[n];
     const values = { unit: unit || this.worded("pure-number"), digits: 3, percent: 1 };
@@ -64,7 +65,7 @@ class Task {
     };
   }
 
-  /** Say what becomes of what was typed. */
+  /** Returns the reply to a typed answer. */
   check(
     n: number, typed: string,
   ): Reply & { heading: string, unread?: { why: string, text: string }} {
@@ -90,7 +91,7 @@ class Task {
     return judge(this.case(n), value, this.others(n));
   }
 
-  /** Right answers without a name, and for the other names. */
+  /** Returns the right answers without a name and for the other names. */
   * others(n: number): Iterable<[string, number]> {
     const { exercise } = this, seen = new Set([plainName(this.student)]);
     for (const name of [exercise.unnamed, ...this.names()]) {
@@ -107,14 +108,14 @@ class Task {
       : this.worded("heading", { number: n + 1, verdict: this.worded(`verdict-${verdict}`) });
   }
 
-  /** The next hint; the last one again when there are no more. */
+  /** Returns the next hint, or the last one again if there are no more. */
   hint(n: number) {
     const standing = this.standings[n];
     standing.hints = Math.min(standing.hints + 1, this.exercise.questions[n].hints.length);
     return this.hintAt(n, standing.hints);
   }
 
-  /** @param hint from 1 on */
+  /** @param hint number from 1 */
   hintAt(n: number, hint: number) {
     const { hints } = this.exercise.questions[n];
     return {
@@ -124,7 +125,7 @@ class Task {
     };
   }
 
-  /** The working with the answer; it is noted. */
+  /** Returns the working with the answer, and notes that it was shown. */
   reveal(n: number) {
     const { working, unit, source } = this.exercise.questions[n];
     this.standings[n].revealed = true;
@@ -136,7 +137,7 @@ class Task {
     };
   }
 
-  /** How far a question got, in words. */
+  /** Returns the progress with a question in words. */
   state(n: number) {
     const { verdict, tries, hints, revealed } = this.standings[n];
     const count = (id: string, number: number) => {
@@ -149,7 +150,7 @@ class Task {
     return remarks ? `${said} (${remarks})` : said;
   }
 
-  /** What is told to the platform that keeps the score. */
+  /** Progress as it is reported to a learning platform. */
   get progress() {
     const { standings } = this, total = standings.length;
     const done = standings.filter(({ verdict }) => verdict === "right").length;
@@ -176,7 +177,8 @@ class Task {
     };
   }
 
-  /** Go on from a result; what is not of this lesson, or no such thing, is left out. */
+  /** Restore a stored result. One of another lesson is ignored, and so are parts that do not
+   * fit. */
   goOn(kept: any) {
     if (kept?.chutelab_result !== 1 || kept.lesson !== this.exercise.name) return;
     const whole = (value: unknown) =>

@@ -1,4 +1,4 @@
-// What measures in the picture: flow line, tape, angle, stop watch and tracer.
+// Measuring tools in the picture: flow line, tape, protractor, stop watch and tracer.
 
 import { roundUp } from "./chart.ts";
 import { eased, html, iconButton } from "./panels.ts";
@@ -13,18 +13,18 @@ import type { Words } from "./words.ts";
 
 type Point = [number, number];
 
-/** A strobe dot that is so near is meant, px; a track farther away is not. */
+/** A strobe dot within MAGNET is taken; a track must be within REACH, px. */
 const MAGNET = 8, REACH = 26;
 
-/** Tracks that are traced at most, as many as are drawn. */
+/** Most tracks that can be traced: as many as are drawn. */
 const MOST_TRACED = 40;
 
 /** Steps of the search for the nearest point of a track. */
 const COARSE = 200, FINER = 30;
 
-/** When a track is nearest to a place: the nearest of many points, then closed in on.
+/** Returns when a track is nearest to a point: the nearest of many points of it, then refined.
  * @param y m
- * @returns s and m */
+ * @returns time, s, and distance, m */
 function nearestOn(track: Track, x: number, y: number): { t: number, far: number } {
   const { begin, end } = track;
   const far = (t: number) => {
@@ -44,18 +44,18 @@ function nearestOn(track: Track, x: number, y: number): { t: number, far: number
   return { t, far: far(t) };
 }
 
-/** The angle at a corner between the ways to two points, degrees from 0 to 180. */
+/** Returns the angle at a corner between the directions to two points, degrees from 0 to 180. */
 function angleBetween([x, y]: Point, [ax, ay]: Point, [bx, by]: Point) {
   const [ux, uy, vx, vy] = [ax - x, ay - y, bx - x, by - y];
   return (Math.atan2(Math.abs(ux * vy - uy * vx), ux * vx + uy * vy) * 180) / Math.PI;
 }
 
-/** A watch that runs with the picture's time, backwards too. */
+/** A stop watch that follows the picture's time, also backwards. */
 class StopWatch {
-  /** s before it was started last */
+  /** Reading when it was last started, s */
   before = 0;
 
-  /** When it was started; null while it stands. */
+  /** When it was started, s; null while it is stopped. */
   since: number | null = null;
 
   laps: number[] = [];
@@ -89,7 +89,7 @@ class Tools {
   laps?: any;
   starter?: any;
 
-  /** @param flow the line that counts; a lesson has none */
+  /** @param flow the counting line; lessons have none */
   constructor(
     readonly lab: Lab, readonly stage: Stage, readonly words: Words, readonly flow?: Flow,
   ) {
@@ -128,10 +128,10 @@ class Tools {
 
   tape: Point[] = [];
 
-  /** Corner, and a point on each side. */
+  /** The corner, and a point on each leg. */
   protractor: Point[] = [];
 
-  /** What is traced: when, and which particle from 0. */
+  /** What is traced: time, s, and number of the particle, from 0. */
   traced = { t: 0, index: 0 };
 
   watch = new StopWatch();
@@ -144,7 +144,7 @@ class Tools {
     button.setAttribute("aria-pressed", String(on));
     if (on) this.on.add(name);
     else this.on.delete(name);
-    // A tool lies in the middle of what is shown when it is taken out.
+    // Put a tool in the middle of the visible part.
     const least = Math.min(view.free.right - view.free.left, view.height);
     const size = roundUp((0.12 * least) / view.scale);
     const [x, y] = view.middle;
@@ -221,9 +221,10 @@ class Tools {
     };
   }
 
-  /** What can be traced that is nearest: a point of a track that is drawn, a strobe dot if one is
-   * close; of a crowd, whose tracks are not drawn, a particle where it is now.
-   * @param y m  @returns s and number from 1 */
+  /** Returns the nearest traceable point: of a drawn track, at a strobe dot if one is close; in a
+   * crowd, whose tracks are not drawn, the present position of a particle.
+   * @param y m
+   * @returns time, s, and number of the particle, from 1 */
   nearest(x: number, y: number): [number, number] | null {
     const { stage, lab } = this, { recording } = lab;
     if (!recording) return null;
@@ -246,7 +247,7 @@ class Tools {
     return [close ? dot : t, index + 1];
   }
 
-  /** Trace what the pointer is over. */
+  /** Trace the point under the pointer. */
   hover() {
     const { stage, lab } = this, { view } = stage, [px, py] = this.pointer;
     const found = this.nearest(view.worldX(px), view.worldY(py));
@@ -257,7 +258,7 @@ class Tools {
     this.refresh();
   }
 
-  /** What a tool says, by its name. */
+  /** Functions that return a tool's texts, by the name of the tool. */
   texts: Record<string, () => string[]> = {
     flow: () => this.flow?.says ?? [], tape: () => this.tapeTexts(),
     protractor: () => [this.angleText()],
@@ -299,7 +300,7 @@ class Tools {
       const [[x, y], [ax, ay], [bx, by]] = this.protractor.map(at);
       const r = Math.min(34, 0.6 * Math.hypot(ax - x, ay - y), 0.6 * Math.hypot(bx - x, by - y));
       const [alpha, beta] = [Math.atan2(ay - y, ax - x), Math.atan2(by - y, bx - x)];
-      // The smaller of the two angles, clockwise on the screen or not.
+      // Draw the smaller of the two angles, clockwise or counterclockwise on the screen.
       const sweep = Math.sin(beta - alpha) > 0 ? 1 : 0;
       const arc = [alpha, beta].map((angle) =>
         `${x + r * Math.cos(angle)} ${y + r * Math.sin(angle)}`);
@@ -315,10 +316,11 @@ class Tools {
     }
   }
 
-  /** Where texts stand, px, by tools, and for what: there they stay while only the time goes on. */
+  /** Places of the tools' texts, px, by tool, with what they depend on: they stay while only
+   * time passes. */
   spots: Map<string, { of: string, at: Point }> = new Map();
 
-  /** Lines of text near a place, where nothing else is, or else beside it.
+  /** Write lines of text in a free place near a point, or beside it if there is none.
    * @param place px */
   write(tool: string, [x, y]: Point, lines: string[]) {
     const { stage, lab } = this, { view } = stage, rows = lines.length;

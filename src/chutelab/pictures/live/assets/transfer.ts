@@ -3,14 +3,14 @@
 // rise, on which particles are carried by adhesion.
 import { arcCos, atan2, lengthOf, sinCos } from "./trig.ts";
 
-/** Why there is no number: `claim` says what a simulation would show, as Python's `Reason`. */
+/** Why there is no number; `claim` is what a simulation would show, as in Python's `Reason`. */
 export interface Reason {
   claim: "outside" | "early" | "no-impact" | "second" | "misses";
   text: string; // id of a text in the catalogue
   words: Record<string, number | string>; // names and numbers for that text
 }
 
-/** Of a transfer, SI units */
+/** Parameters of a transfer, SI units */
 interface Parameters {
   speed: number; // of the incoming belt
   pulleyRadius: number;
@@ -27,12 +27,12 @@ interface Parameters {
   inertia?: number; // I/(m r²)
   incline?: number; // rad
   plateFriction?: number;
-  interval?: number; // time per particle
-  asPrinted?: boolean; // Eq. (9) as it is printed, for an upright plate without friction
-  unboundedPlate?: boolean; // false: do not object to what its line would do elsewhere
+  interval?: number; // s per particle
+  asPrinted?: boolean; // use Eq. (9) as printed: upright plate, no friction
+  unboundedPlate?: boolean; // false: crossing the plate's line beyond its ends is no hit
 }
 
-/** Quantities by the stage that yields them, in the order of events. */
+/** Quantities by the stage that gives them, in the order of events. */
 const STAGES = {
   separation: ["phi1", "v1", "omega1"],
   impact: ["t2", "x2", "y2", "v2", "v2x", "v2y", "phi2"],
@@ -51,7 +51,7 @@ export function because(
   return { claim, text, words };
 }
 
-/** Returns a transfer without a stage and all later ones, and says why. */
+/** Returns a transfer without the numbers of a stage and all later ones, with the reason. */
 export function cutFrom(found: Transfer, stage: Stage, reason: Reason | null): Transfer {
   const numbers = { ...found.numbers };
   let lost = false;
@@ -67,8 +67,8 @@ export function unanswered(): Transfer {
 }
 
 /**
- * Where the pulley is left: angle from its top with cosine and sine, speed, and after what time a
- * flight that is thrown up comes down on the pulley again.
+ * Returns where a particle leaves the pulley: angle from the top with its cosine and sine, speed,
+ * and the time after which a particle thrown upwards falls on the pulley again.
  */
 function separationOf(speed: number, rideRadius: number, gravity: number, incline: number) {
   const unit = gravity * rideRadius;
@@ -133,7 +133,7 @@ export function transfer({
   require("distance", Number.isFinite(distance + pivotHeight));
   const [sin, cos] = sinCos(angle);
   const toPivot = (pulleyRadius + distance) * cos + pivotHeight * sin - particleRadius;
-  // The gap on the pulley is least where the centre's radius is square to the plate.
+  // On the pulley the gap is smallest where the radius to the centre is normal to the plate.
   const closest = Math.min(Math.max(quarter - angle, -incline), left.phi1);
   const behind = toPivot < rideRadius * sinCos(closest + angle)[0] && found.reason === null;
   if (behind && unboundedPlate) for (const name of STAGES.separation) numbers[name] = NaN;
@@ -145,7 +145,7 @@ export function transfer({
   const discriminant = closing * closing - 2.0 * gravity * sin * gap;
   const normal = Math.sqrt(discriminant);
   const t2 = 2.0 * gap / (closing + normal); // Eq. (5)
-  // Thrown up steeply, it meets a plate that leans away when it comes down again.
+  // Thrown up steeply, it hits a plate that leans away only on its way down.
   const parts = closing <= 0.0 && sin >= 0.0;
   const comesDown = Number.isFinite(left.again) && !(!parts && t2 <= left.again);
   fail(comesDown, because("early", "comes-down-again", { surface: "pulley" }));
@@ -159,7 +159,7 @@ export function transfer({
   const v2 = lengthOf(v2x, v2y); // Eq. (6)
   keep({ t2, x2, y2, v2x, v2y, v2, phi2: atan2(normal, tangential) }); // Eq. (7)
 
-  // Leave the plate. Coulomb: the impulse that stops the slip, or as much as friction can give.
+  // Leave the plate. Coulomb: the impulse that ends slip, or the most that friction allows.
   require("restitution", restitution >= 0.0 && restitution <= 1.0);
   require("plateFriction", plateFriction >= 0.0);
   require("asPrinted", !asPrinted || (plateFriction === 0.0 && angle === 0.0));
@@ -174,7 +174,7 @@ export function transfer({
   if (asPrinted) [away, down] = sinCos(phi2r).map((part) => v2r * part);
   keep({ phi2r, v2r, omega2: turning(rim) }); // Eq. (9)
 
-  // Fall on the outgoing belt, and be taken along by it.
+  // Fall on the outgoing belt, and be carried along by it.
   require("drop", drop >= 0.0 && drop < Infinity);
   require("beltSpeed", Number.isFinite(beltSpeed));
   require("mass", mass > 0.0 && mass < Infinity);
@@ -182,7 +182,7 @@ export function transfer({
   const v3x = away * cos - down * sin;
   const sinking = away * sin + down * cos;
   const v3y = Math.sqrt(sinking * sinking + 2.0 * gravity * drop);
-  // Eq. (12), the root that does not cancel for either sign of b
+  // Eq. (12), in the form without cancellation for either sign of b
   let t3 = sinking >= 0.0 ? 2.0 * drop / (sinking + v3y) : (v3y - sinking) / gravity;
   if (drop === 0.0 && sinking >= 0.0) t3 = 0.0;
   fail(!Number.isFinite(t3), because("misses", "never-comes-down"));
@@ -211,15 +211,15 @@ export function transfer({
   return found;
 }
 
-/** Newton rounds; fewer than 20 are ever used. */
+/** Most rounds of Newton's method; fewer than 20 are needed. */
 const MOST_ROUNDS = 100;
 
 /**
- * Where a body leaves the pulley of a level belt that grips with finite friction, as Python's
- * `theory/slide.py`; without its spin, which takes a quadrature.
- * With u = v² / (g Rc) and φ the angle from the top, the normal force is m g w, w = cos φ - u.
- * Held, u = u0 + 2/(1 + k) (1 - cos φ) for a body that rolls, k = I/(m r²), else u0, until friction
- * cannot bear the pull any more; then it slips, w' = 2 µ w - 3 sin φ, and leaves where w = 0.
+ * Returns where a body leaves the pulley of a level belt with finite friction, as Python's
+ * `theory/slide.py` does; the spin, which takes a quadrature, is left out. With u = v² / (g Rc) and
+ * φ the angle from the top, the normal force is m g w, w = cos φ - u. While it sticks, u = u0 +
+ * 2/(1 + k) (1 - cos φ) for a body that rolls, k = I/(m r²), else u = u0. Once friction is exceeded
+ * it slips, w' = 2 µ w - 3 sin φ, and it leaves where w = 0.
  * @param parameters SI units
  * @returns rad, m/s
  */
@@ -237,7 +237,7 @@ export function separationWithSlip({
   const grip = (spin ? (3.0 + inertia) / inertia : 1.0) * friction;
   const most = spin ? ((1.0 + inertia) * start + 2.0) / (3.0 + inertia) : start;
   const short = (spin ? (1.0 + inertia) / (3.0 + inertia) : 1.0) * (1.0 - start);
-  // In tan(φ/2) the onset of slip is a quadratic; this form of its root does not cancel.
+  // The onset of slip is a quadratic in tan(φ/2); this form of its root has no cancellation.
   const base = 1.0 + Math.hypot(1.0, grip * Math.sqrt(short * (1.0 + most)));
   const tangent = (grip * short) / base, onset = 2.0 * Math.atan(tangent);
   const pressed = (fall * 2.0 * short) / (base * (1.0 + tangent * tangent));
@@ -248,7 +248,7 @@ export function separationWithSlip({
       + swell * Math.expm1(2.0 * friction * x);
     return pressed + change / (1.0 + 4.0 * friction * friction);
   };
-  // With endless grip it would leave at cos φ = `most`. w is concave: Newton from the right.
+  // Without slip it would leave at cos φ = `most`. w is concave: Newton from the right.
   const last = Math.sqrt(short / (1.0 + most));
   let x = Math.min(2.0 * Math.atan((last - tangent) / (1.0 + last * tangent)), 1.0 / friction);
   for (let round = 0; round < MOST_ROUNDS; round += 1) {

@@ -1,4 +1,4 @@
-// Play, pause, step, scrub, and how fast; undo and redo.
+// Play, pause, step, time slider and speed; undo and redo.
 
 import { Marks } from "./marks.ts";
 import { slide, style } from "./panels.ts";
@@ -6,16 +6,16 @@ import { RATES, type Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
 
-/** Positions of the slider of time. */
+/** Positions of the time slider. */
 const PLACES = 1000;
 
-/** No frame counts for more than this, s: a page that was hidden goes on where it was. */
+/** Longest frame that counts, s: after it was hidden, a page goes on where it was. */
 const LONGEST = 0.1;
 
-/** s over which the pace is measured, and the share of what is played from which on it is slow. */
+/** Time over which the pace is measured, s; below this share of the wanted pace it is slow. */
 const GAUGED = 2, SLOW = 0.95;
 
-/** ms without the pointer or a key after which a projector shows the picture alone. */
+/** Time without pointer or key after which projector mode shows the picture alone, ms. */
 const ASLEEP = 3000;
 
 class Transport {
@@ -60,7 +60,7 @@ class Transport {
     }
     this.rate.addEventListener("change", () => { lab.rate = Number(this.rate.value); });
     this.time.addEventListener("input", () => {
-      // A pause puts the slider back to the time that is shown.
+      // Read it first: a pause sets the slider back to the shown time.
       const share = Number(this.time.value) / PLACES;
       lab.pause();
       lab.seek(lab.start + (lab.horizon - lab.start) * share);
@@ -90,10 +90,10 @@ class Transport {
     requestAnimationFrame((next) => this.frame(next));
   }
 
-  /** Real seconds and those that were shown, of the last frames that were played. */
+  /** Real and shown time of the last played frames, s. */
   frames: [number, number][] = [];
 
-  /** Say so where the engine is slower than what it is played at, on the mean of two seconds. */
+  /** Say so if the engine is slower than the wanted pace, averaged over two seconds. */
   gauge(seconds: number, shown: number) {
     const { lab, frames, slow, words } = this;
     if (!lab.playing) frames.length = 0;
@@ -115,7 +115,7 @@ class Transport {
     this.why.hidden = !on;
   }
 
-  /** A sixtieth of a second of what is shown, in the pace it is shown. */
+  /** Step by a sixtieth of a second at the chosen pace. */
   step(sign: number) {
     this.lab.pause();
     this.lab.seek(this.lab.t + (sign * this.lab.rate) / 60);
@@ -124,14 +124,14 @@ class Transport {
   refresh() {
     const { lab, words } = this;
     const span = lab.horizon - lab.start, track = this.time.parentElement;
-    // What is computed is hatched until all of it is.
+    // Mark the computed part of the slider until all is computed.
     const ready = span > 0 ? (lab.end - lab.start) / span : 1;
     track.classList.toggle("computing", ready < 1);
     style(track, "--ready", ready.toFixed(3));
     slide(this.time, span > 0 ? Math.round(((lab.t - lab.start) / span) * PLACES) : 0);
     const clock = `${words.fixed(lab.t, 3)} s`;
     this.clock.textContent = clock;
-    // It is heard once it stands.
+    // Screen readers read the time only while it stands still.
     if (!lab.playing) this.time.setAttribute("aria-valuetext", this.marks.saysNow || clock);
     this.playButton.classList.toggle("playing", lab.playing);
     const says = words.say(lab.playing ? "pause" : "play");
@@ -139,7 +139,7 @@ class Transport {
     const { undoButton, redoButton } = this, { activeElement } = document;
     undoButton.disabled = !lab.past.length;
     redoButton.disabled = !lab.future.length;
-    // What cannot be pressed any more loses the focus.
+    // A disabled button loses the focus: pass it on.
     if (undoButton.disabled && activeElement === undoButton) redoButton.focus();
     if (redoButton.disabled && activeElement === redoButton) undoButton.focus();
     this.fault.hidden = !lab.fault || lab.asked !== "" || document.body.matches(".dragging");
@@ -147,25 +147,25 @@ class Transport {
   }
 }
 
-/** Whether the card of energies was open before the page was made large. */
+/** Whether the energy card was open before projector mode. */
 let wasOpen = false;
 
-/** Large and on the full screen, or as before. */
+/** Switch projector mode (large, full screen) on or off. */
 function project() {
   const { classList } = document.documentElement, on = classList.toggle("projector");
   document.getElementById("full")?.setAttribute("aria-pressed", String(on));
   if (on) wake();
-  // Open, it would hide a part of the machine on a small screen.
+  // An open energy card would hide a part of the machine on a small screen.
   const energy = document.getElementById("energy") as HTMLDetailsElement | null;
   if (energy) [wasOpen, energy.open] = [energy.open, !on && wasOpen];
-  // Where a page may not take the screen, it is large all the same.
+  // If full screen is not allowed, the page is at least large.
   if (on) document.documentElement.requestFullscreen?.().catch(() => {});
   else if (document.fullscreenElement) document.exitFullscreen();
 }
 
 let sleep = 0;
 
-/** Show for a while what else a projector has. */
+/** Show the controls of projector mode for a while. */
 function wake() {
   const { classList } = document.documentElement;
   classList.add("awake");

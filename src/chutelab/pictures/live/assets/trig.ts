@@ -1,4 +1,4 @@
-// Sine, cosine and their inverses, those of the core: the same bits everywhere.
+// The core's sine, cosine and inverses: the same bits everywhere.
 
 import type { Memory } from "./core.ts";
 
@@ -8,7 +8,7 @@ export const RADIANS = Math.PI / 180.0;
 let functions: Record<"sine" | "cosine" | "angle_of" | "angle_of_cosine",
   (...numbers: number[]) => number>;
 
-/** Take the functions of a core; nothing here works before. */
+/** Take the functions of a core; nothing here works before that. */
 export function useCore({ exports }: Memory) {
   functions = exports;
 }
@@ -36,8 +36,7 @@ export function lengthOf(x: number, y: number) {
   return Math.sqrt(x * x + y * y);
 }
 
-/**
- * Returns the rest of a division that has the sign of the divisor, as Python's `%`.
+/** Returns the remainder with the sign of the divisor, as Python's `%`.
  * @param by positive
  */
 export function modulo(value: number, by: number) {

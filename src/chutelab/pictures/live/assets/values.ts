@@ -1,4 +1,4 @@
-// The values that a step lets change: a row under the picture, and numbers in a sentence.
+// The values that can be changed in a step: a row under the picture, and numbers in sentences.
 
 import { roundUp } from "./chart.ts";
 import { boundsOf, checked, fieldsOf, type Field } from "./controls.ts";
@@ -9,13 +9,13 @@ import { Fault } from "./scene.ts";
 import type { Lab } from "./lab.ts";
 import type { Words } from "./words.ts";
 
-/** Pixels to drag a number in a sentence by one step. */
+/** Distance for one step when a number in a sentence is dragged, px. */
 const PULL = 4;
 
-/** How far a pointer may stray that clicks, px. */
+/** Most movement of the pointer during a click, px. */
 const STRAY = 4;
 
-/** A round step that leads through a range in some two hundred. */
+/** Returns a round step: about two hundred of them make the range. */
 const stepOf = ({ low, high, name }: Field) =>
   (name === "count" ? Math.max(1, Math.round((high - low) / 100))
     : isFinite(high - low) && high - low < 1e5 ? roundUp((high - low) / 200) : 0.1);
@@ -35,7 +35,7 @@ class Values {
     lab.on("scene", () => this.fill());
   }
 
-  /** What can be changed now, by key: numbers and words, and both coordinates of a point. */
+  /** What can be changed, by key: numbers, words, and both coordinates of points. */
   get fields(): Map<string, Field> {
     const { data, given, scene } = this.lab;
     if (!given || !scene) return new Map();
@@ -53,7 +53,7 @@ class Values {
     return new Map([...plain, ...points].map((field) => [field.key, field]));
   }
 
-  /** Take over a number, or what was typed. */
+  /** Apply a number or a typed text. */
   change(key: string, value: number | string, done = true) {
     const { lab, words } = this, field = this.fields.get(key);
     if (!field) return;
@@ -62,14 +62,14 @@ class Values {
       lab.change({ [key]: typeof value === "number" ? value : checked(field, value, words) }, { done });
     } catch (error) {
       if (!(error instanceof Fault)) throw error;
-      // The reason stands at the field of the row.
+      // The field in the row shows the reason.
       lab.asked = key;
       this.row.asking = this.row.entries.get(key)?.input;
       lab.refuse(error);
     }
   }
 
-  /** Move a value by so many steps. */
+  /** Move a value by a number of steps. */
   nudge(key: string, steps: number, done = true) {
     const field = this.fields.get(key);
     if (!field) return;
@@ -82,13 +82,13 @@ class Values {
     return table === "scene" ? said : `${words.name(owner)}: ${said}`;
   }
 
-  /** Forget the numbers of another step's sentences. */
+  /** Begin anew for the sentences of another step. */
   build() {
     this.scrubs = [];
     this.fill();
   }
 
-  /** Show what counts. */
+  /** Show the present values. */
   fill() {
     const fields = [...this.fields.values()];
     this.root.hidden = !fields.length;
@@ -96,8 +96,8 @@ class Values {
     for (const { key, button } of this.scrubs) this.name(key, button);
   }
 
-  /** A number in a sentence: dragged sideways, typed after a click, moved by arrow keys. What
-   * cannot be changed is only told. */
+  /** Returns a number in a sentence: it can be dragged sideways, typed after a click, or moved with
+   * arrow keys. One that cannot be changed is plain text. */
   scrub(key: string): Element {
     const field = this.fields.get(key), { words } = this;
     if (!field) return html("b", { class: "num" });
@@ -159,7 +159,7 @@ class Values {
     button.replaceChildren(text, icon("sideways"));
   }
 
-  /** Have a number in a sentence typed. */
+  /** Replace a number in a sentence by a field to type in. */
   type(key: string, button: any) {
     const field = this.fields.get(key), { words } = this;
     if (!field || button.hidden) return;
@@ -168,7 +168,7 @@ class Values {
     input.value = typeof field.value === "number" ? words.plain(field.value) : "";
     let isOver = false;
     const end = (takes: boolean) => {
-      // To take it away takes its focus, too.
+      // Removing the field also blurs it, which calls this again.
       if (isOver) return;
       isOver = true;
       const { value } = input, had = document.activeElement === input;

@@ -1,4 +1,4 @@
-// Between the world, m with y up, and the picture, pixels with y down.
+// Converts between the world (m, y up) and the picture (px, y down).
 
 import type { Machine, Segment } from "./machine.ts";
 import { memory } from "./plan.ts";
@@ -14,7 +14,7 @@ class View {
   /** Pixels per metre. */
   scale = 100;
 
-  /** The world's point in the middle. */
+  /** The world's point in the middle of the picture, m. */
   x = 0;
 
   y = 0;
@@ -27,13 +27,13 @@ class View {
   /** The part of the picture that no card covers, px. */
   free = { left: 0, top: 0, right: 1, bottom: 1 };
 
-  /** The world's point in the middle of the free part. */
+  /** The world's point in the middle of the free part, m. */
   get middle(): [number, number] {
     const { left, right, top, bottom } = this.free;
     return [this.worldX(0.5 * (left + right)), this.worldY(0.5 * (top + bottom))];
   }
 
-  /** Show all of a box in the free part, with some room round it. @param margin px */
+  /** Show all of a box in the free part, with a margin. @param margin px */
   fit({ left, bottom, right, top }: Box, margin: number = 30) {
     const { free } = this;
     const across = Math.max(1, free.right - free.left - 2 * margin);
@@ -43,7 +43,7 @@ class View {
     this.y = 0.5 * (bottom + top) - (0.5 * (this.height - free.top - free.bottom)) / this.scale;
   }
 
-  /** @param py the point that stays, pixels */
+  /** @param py with `px` the point that stays, px */
   zoom(factor: number, px: number, py: number) {
     const [x, y] = [this.worldX(px), this.worldY(py)];
     this.scale *= factor;
@@ -67,28 +67,28 @@ class View {
     return this.y - (py - 0.5 * this.height) / this.scale;
   }
 
-  /** To what a place that is dragged is rounded: no finer than a pixel, m. */
+  /** Step to which dragged points are rounded: the power of ten up to 1.5 pixels, m. */
   get snap() {
     return 10 ** Math.floor(Math.log10(1.5 / this.scale));
   }
 
-  /** From one line of the grid to the next: a round number of m. */
+  /** Distance between lines of the grid: a round number of m. */
   get mesh() {
     const rough = MESH / this.scale, ten = 10 ** Math.floor(Math.log10(rough));
     return ten * ([1, 2, 5].find((n) => n * ten >= rough) ?? 10);
   }
 
-  /** The size of things that are new here: a round number of m, within the picture's height. */
+  /** Size of new parts: a round number of m, at most the picture's height. */
   get unit() {
     const high = (this.free.bottom - this.free.top) / this.scale;
     const ten = 10 ** Math.floor(Math.log10(high));
     return ten * ([5, 2].find((n) => n * ten <= high) ?? 1);
   }
 
-  /** The place that is meant by one of the picture, px: an end of something, a round angle as seen
-   * `from` a place, a line of the grid, or what rounds to a pixel.
+  /** Returns the point that is meant by one of the picture, px: a near end of a part, else at a
+   * round angle seen from `from`, on a line of the grid, or rounded to about a pixel.
    * @param ends m
-   * @returns m, and whether it is one of the first three */
+   * @returns the point, m, and whether it is one of the first three */
   near([px, py]: Point, ends: Point[], from?: Point): { at: Point, caught: boolean } {
     const far = ([x, y]: Point) => Math.hypot(this.px(x) - px, this.py(y) - py);
     const end = ends.reduce((best: Point | null, one) =>
@@ -116,29 +116,30 @@ class View {
   }
 }
 
-/** How near a place has to be to be meant, px: an end, a line of the grid. */
+/** Distances within which points snap to an end and to a line of the grid, px. */
 const CATCH = 11, LINE = 5;
 
-/** Round angles, and how near one has to be, rad. */
+/** Step of round angles, and how near one has to be, rad. */
 const TURN = Math.PI / 12, NEAR_TURN = Math.PI / 72;
 
-/** Pixels between two lines of the grid, at least. */
+/** Least distance between lines of the grid, px. */
 const MESH = 70;
 
-/** m of belts and walls that are shown beyond all that matters; of walls at most this share of the
- * height that matters. */
+/** How much of belts and walls is shown beyond everything else, m; in a crowd, walls above the
+ * highest particle at most by this share of the height. */
 const BEYOND = 0.35, ABOVE = 0.2;
 
-/** What is shown where nothing is yet. */
+/** The view of an empty scene. */
 const EMPTY: Box = { left: -0.6, bottom: -0.6, right: 0.6, top: 0.4 };
 
-/** Share of the machine's size, of the fall of what has fallen off that is shown. */
+/** How much of the fall of particles that leave the scene is shown, as a share of the machine's
+ * size. */
 const FALL = 0.35;
 
-/** What is shown of a machine at first: its tracks and all that they can meet, but only so much of
- * belts and walls, which may be long, and of the fall of what leaves the scene.
- * @param ride whether all of the way on the incoming belt is shown, however long
- * @param swept places that what moves goes through, m */
+/** Returns the first view of a machine: its tracks and everything near them. Of long belts and
+ * walls, and of the fall of particles that leave the scene, only a part is shown.
+ * @param ride whether the whole ride on the incoming belt is shown, however long
+ * @param swept points passed by moving parts, m */
 function boxOf(
   machine: Machine, points: { x: number, y: number }[], ride: boolean = false,
   swept: Point[] = [],
@@ -166,11 +167,11 @@ function boxOf(
     south = Math.min(south, bottom + margin);
     north = Math.max(north, top - margin);
   }
-  // Without a surface nothing is left.
+  // Without surfaces there is no scene to leave.
   const all = !machine.segments.length && !machine.arcs.length;
   const inside = ({ x, y }: { x: number, y: number }) =>
     all || (x >= west && x <= east && y >= south && y <= north);
-  // Of the ride on the incoming belt no more than a little more than what comes after it.
+  // Show little more of the ride on the incoming belt than of the motion after it.
   const onward = machine.pulley ? points.filter((one) => one.x >= 0 && inside(one)) : [];
   const span = onward.reduce((most, { x, y }) => Math.max(most, x, Math.abs(y)), 0);
   const from = onward.length && !ride ? -1.25 * span : -Infinity;
@@ -178,12 +179,12 @@ function boxOf(
   if (!points.length) machine.releases.forEach(({ x, y }, i) => widen(x, y, machine.radius[i]));
   const ends = ({ x, y, tx, ty, length }: Segment) =>
     [[x, y], [x + tx * length, y + ty * length]];
-  // Walls may reach far above all that ever was up there.
+  // Walls may reach far above all particles.
   const highest = [...points, ...machine.releases]
     .reduce((top, { y }) => Math.max(top, y), -Infinity);
   const still = machine.segments.filter(({ speed }) => !speed);
   const lowest = Math.min(...still.flatMap(ends).map(([, y]) => y));
-  // Of a crowd that lies in it little of what is above matters.
+  // Of walls round a crowd, show little above the particles.
   const above = machine.interact ? Math.min(BEYOND, ABOVE * Math.max(0, highest - lowest)) : BEYOND;
   const ceiling = isFinite(highest) ? highest + above : Infinity;
   for (const [x, y] of still.flatMap(ends)) widen(x, Math.min(y, ceiling));
@@ -193,7 +194,7 @@ function boxOf(
   }
   for (const place of swept) widen(...place);
   if (!isFinite(box.left)) return EMPTY;
-  // What opens lets something fall.
+  // Below a surface that vanishes, show where particles fall.
   if (machine.segments.some(({ vanishes }) => isFinite(vanishes))) {
     widen(box.left, box.bottom - FALL * (box.top - box.bottom));
   }

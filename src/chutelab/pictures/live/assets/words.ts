@@ -1,8 +1,8 @@
-// All that is said, from the catalogue of one language; numbers as that language writes them.
+// All texts, from the catalogue of one language, and numbers as that language writes them.
 
 import type { Fault } from "./scene.ts";
 
-/** A whole number as an exponent. */
+/** Returns a whole number in superscript. */
 const raised = (power: number) => String(power).replace(/./g, (sign) =>
   (sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(sign)]));
 
@@ -16,18 +16,18 @@ class Words {
     this.comma = sample.includes(",");
   }
 
-  /** @param values for {names} in it */
+  /** @param values values for {names} in the text */
   say(id: string, values: Record<string, string | number> = {}) {
     const text = this.catalogue[id] ?? id;
     return text.replace(/\{(\w+)\}/g, (whole, name) => String(values[name] ?? whole));
   }
 
-  /** The title of a scene: those that are shipped have one in each language. */
+  /** Returns the title of a scene: shipped scenes have one in each language. */
   title(title: string) {
     return this.catalogue[`title-${title}`] ?? title;
   }
 
-  /** A surface or stream by its name: ours are translated, a scene's own stand as they are. */
+  /** Returns the name of a surface or stream: known names are translated, others unchanged. */
   name(name: string) {
     const [, stem, number] = /^([a-z]+)(\d+)$/.exec(name)
       ?? /^(material|pair|string|rod|spring|pin) (.*)$/.exec(name) ?? [];
@@ -35,13 +35,13 @@ class Words {
     return this.catalogue[`name-${name}`] ?? (part ? `${part} ${number}` : name);
   }
 
-  /** A key of the scene, such as `plate.angle_deg`. */
+  /** Returns the name of a scene's key, such as `plate.angle_deg`. */
   key(table: string, key: string) {
     const { catalogue } = this;
     return catalogue[`key-${table}.${key}`] ?? catalogue[`key-${key}`] ?? key;
   }
 
-  /** Why a scene cannot be. */
+  /** Returns why a scene is invalid. */
   fault({ key, text, words: found }: Fault) {
     const [path, ...rest] = key.replace(/(?<=\..*)\[\d+\]/g, "").split("."), name = rest.join(".");
     const [table, row] = path.split(/\[|\]/);
@@ -56,38 +56,38 @@ class Words {
     return where ? `${where}: ${why}` : why;
   }
 
-  /** Why a value cannot be, below the field in which it was typed. */
+  /** Returns why a value is invalid, for the text below its field. */
   why(fault: Fault, key: string) {
     const text = fault.key === key ? this.fault({ ...fault, key: "" } as Fault) : this.fault(fault);
     return `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
   }
 
-  /** A word of a scene's keys, such as that of a material. */
+  /** Returns the name of a value that is a word, such as a material. */
   choice(word: string) {
     return this.catalogue[`choice-${word}`] ?? word;
   }
 
-  /** The end of a range. */
+  /** Returns an end of a range as text. */
   bound(value: number) {
     return this.local(String(Number(value.toPrecision(6))));
   }
 
-  /** A value with as many digits as are read. */
+  /** Returns a value rounded to six digits; integers unchanged. */
   brief(value: number) {
     return Number.isInteger(value) ? value : Number(value.toPrecision(6));
   }
 
-  /** A value to be typed over. */
+  /** Returns a value as text for a field. */
   plain(value: number) {
     return this.local(String(this.brief(value)));
   }
 
-  /** A unit as it is written behind a number. */
+  /** Returns a unit as it is written after a number. */
   unit(unit: string) {
     return unit === "degrees" ? "°" : unit.replace(/m2$/, "m²");
   }
 
-  /** A number with so many significant digits, 0 as 0. */
+  /** Returns a number with this many significant digits; 0 as "0". */
   number(value: number, digits: number = 4) {
     if (!isFinite(value)) return "–";
     if (value === 0) return "0";
@@ -100,12 +100,12 @@ class Words {
     return this.local(text);
   }
 
-  /** With so many digits behind the point. */
+  /** Returns a number with this many decimals. */
   fixed(value: number, places: number) {
     return this.local((Math.abs(value) < 0.5 * 10 ** -places ? 0 : value).toFixed(places));
   }
 
-  /** An energy in mJ or J. @param value J */
+  /** Returns an energy in mJ or J. @param value J */
   energy(value: number) {
     const size = Math.abs(value);
     if (size < 5e-13) return "0 mJ";
@@ -117,13 +117,13 @@ class Words {
     return this.comma ? signed.replace(".", ",") : signed;
   }
 
-  /** A value as it is shown beside a handle. */
+  /** Returns a value as it is shown beside a handle. */
   value({ value, unit }: Quantity) {
     const places = ({ degrees: 1, "m/s": 2 } as Record<string, number>)[unit] ?? 3;
     return `${this.fixed(value, places)}${unit === "degrees" ? "°" : unit ? ` ${unit}` : ""}`;
   }
 
-  /** The values of a handle that are seen, the first two; with what they are, or bare. */
+  /** Returns the first two shown values of a handle, with their names or bare. */
   values(
     axes: { key: string, value: number, unit: string, part?: number, step: number }[], bare = false,
   ) {
@@ -136,7 +136,7 @@ class Words {
     }).join(bare ? ", " : "\n");
   }
 
-  /** A number that was typed, with point or comma; NaN of other text. */
+  /** Returns the number in a typed text, with point or comma; NaN for other texts. */
   parse(text: string) {
     const plain = text.trim().replace("−", "-").replace(",", ".");
     return /^[-+.\de]+$/i.test(plain) ? Number(plain) : NaN;

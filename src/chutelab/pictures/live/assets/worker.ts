@@ -1,21 +1,24 @@
-// The engine's own thread: runs machines, so that the picture never waits for them.
+// The engine's thread: it runs machines, so that the picture never waits for them.
 //
-// In:  {type: "load", module, layout}, the core compiled; {type: "run", id, machine, until}
-//      begins a run and ends the one before, with `pushes` done in it already; {type: "until", id,
-//      until} lets it go on to a later time (s); {type: "push", id, push} pushes something.
-// Out: {type: "chunk", id, knots, tips, events, swings, totals, triggered, now, state, books,
-//      reasons, gained, unsolved, pushed, given}, where state is "running", "done", "stalled" or
-//      "failed"; books and reasons come at the end; triggered are the times of what waited for a
-//      touch, s; gained is the energy by which solves broke their law so far, J, and unsolved the
-//      most overlap that one left, radii; pushed is the work of all pushes, J, and given that of
-//      all surfaces; totals are what all particles of a machine with joints have at each step.
-//      {type: "laws", id, breaches}, in answer to {type: "judge", id, run}.
-//      {type: "broken"}, where the core cannot be loaded.
+// In:  {type: "load", module, layout}: the compiled core.
+//      {type: "run", id, machine, until, pushes}: ends the run before and begins a new one, with
+//      these pushes made again.
+//      {type: "until", id, until}: the run may go on to a later time, s.
+//      {type: "push", id, push}: pushes something.
+//      {type: "judge", id, run}: asks for breaches of laws.
+// Out: {type: "chunk", id, state, now, …}: new results of the run. `state` is "running", "done",
+//      "stalled" or "failed". `triggered` are the times of what waits for a touch, s; `totals` the
+//      sums over all particles at each step, for machines with joints; `pushed` the work of all
+//      pushes and `given` that of all surfaces, J; `gained` the energy by which solves have broken
+//      their law so far, J; `unsolved` the largest overlap that a solve left, in radii. `books` and
+//      `reasons` come at the end.
+//      {type: "laws", id, breaches}: the answer to "judge".
+//      {type: "broken"}: the core could not be loaded.
 
 import { judge } from "./breaches.ts";
 import { startCore, type Core, type Event, type Layout } from "./core.ts";
 
-/** ms between two looks at the messages, and up to the first of a run. */
+/** Time between two looks at the messages, and until the first look in a run, ms. */
 const TURN = 10, FIRST = 2;
 
 /** Most steps of the core between two looks at the clock. */
@@ -27,11 +30,11 @@ let job: { id: number, until: number, steps: number, turn: number } | null = nul
 
 /** A force on a particle, N, or a torque on what hangs on a hinge, N m. */
 export type Given = { disk: number, force: [number, number] } | { surface: number, torque: number };
-/** From a time on to another, s */
+/** Acts from `at` to `due`, s */
 export type Push = Given & { at: number, due: number };
 type State = "running" | "done" | "stalled" | "failed";
 
-/** What has been written, and not been told yet. */
+/** Results that have not been sent yet. */
 let written = { knots: [] as Float64Array[], events: [] as Event[], swings: [] as number[],
   totals: [] as Float64Array[] };
 
@@ -48,8 +51,8 @@ function schedule() {
   channel.port2.postMessage(null);
 }
 
-/** Whether the run has reached the time it may go to. Without contacts between them disks run one
- * after the other, each to its end. */
+/** Returns whether the run has reached the time up to which it may go. Disks without contacts
+ * between them are run one after another, each to its end. */
 const isAhead = (task: { until: number }) => core.machine?.interact && core.get("t") >= task.until;
 
 function work() {
@@ -80,7 +83,7 @@ function go(steps: number): State {
   return state;
 }
 
-/** Run on to a step that ends no earlier than a time, s. */
+/** Run to the first step that ends at a time, s, or later. */
 function goTo(t: number): State {
   let state: State = "running";
   core.set("pause", t);
@@ -89,7 +92,8 @@ function goTo(t: number): State {
   return state;
 }
 
-/** Push something, as Python's `chutelab.start` does: rounding of a sum of times is no step. */
+/** Push something, as Python's `chutelab.start` does. A rounding error of `due` must not cost a
+ * step. */
 function push(one: Push): State {
   const give = (share: number) => ("surface" in one
     ? core.exports.turn_hinge(one.surface, share * one.torque)
@@ -100,7 +104,7 @@ function push(one: Push): State {
   return state;
 }
 
-/** Hand on what has been written. */
+/** Send the results. */
 function tell(state: State) {
   if (!job) return;
   const over = state !== "running", { events, swings } = written;

@@ -15,9 +15,11 @@
 #define FROM_CURVE 2
 /* Bound on the refinements of a root: Newton's method takes about 8, by halving alone this. */
 #define REFINEMENTS 120
-/* Halvings of a time, past its last bit, and descents of a polynomial of degree 4: it has two, and by rounding
-   another one or two. */
-#define HALVINGS 52
+/* Halvings of a time after which a polynomial with two roots in it is a parabola that is still larger than its rounding;
+   steps to where that turns back; and descents of a polynomial of degree 4: it has two, and by rounding another one or
+   two. */
+#define HALVINGS 20
+#define TURNINGS 4
 #define MOST_ROOTS 4
 /* rad; an obstacle this close to the present angle is met now: by rounding it may be passed. */
 #define NOW 2e-11
@@ -62,18 +64,37 @@ static double crossing(const double *c, double low, double high) {
     return t;
 }
 
+/* Where a polynomial of degree 4 that is all but a parabola there turns back: Newton's method on its slope. */
+static double turning_point(const double *c, double low, double high) {
+    double t = 0.5 * (low + high);
+    for (int n = 0; n < TURNINGS; n++) {
+        double value = 0.0, rate = 0.0, half = 0.0;
+        for (int k = 4; k >= 0; k--) half = half * t + rate, rate = rate * t + value, value = value * t + c[k];
+        t = MIN(MAX(t - 0.5 * rate / half, low), high);
+    }
+    return t;
+}
+
 /* Find where a polynomial of degree 4 becomes negative from `low` to `high`, in order; returns how many such t were
    found by then. Its Bernstein coefficients there change sign as often as it has roots, or two or four times more:
-   what may have several is halved. */
+   what may have several is halved. Where that does not part two, it tells by where the polynomial turns back whether
+   zero is crossed or but touched: the coefficients would tell rounding. */
 static int isolate(const double *c, const double *bernstein, double low, double high, int halvings, double *found,
                    int count) {
     double left[5], right[5];
     int below = bernstein[0] < 0.0, changes = 0;
     for (int n = 1; n < 5; n++) changes += (bernstein[n] < 0.0) != (bernstein[n - 1] < 0.0);
-    if (changes == 0 || (changes == 1 && below) || !halvings || count == MOST_ROOTS) return count;
+    if (changes == 0 || (changes == 1 && below) || count == MOST_ROOTS) return count;
     if (changes == 1) {
         found[count] = crossing(c, low, high);
         return count + 1;
+    }
+    if (!halvings) {
+        double turn = turning_point(c, low, high);
+        if (below) low = turn;
+        else if (changes % 2 == 0) high = turn;
+        if (polynomial(c, 5, low) > 0.0 && polynomial(c, 5, high) < 0.0) found[count++] = crossing(c, low, high);
+        return count;
     }
     /* Coefficients of both halves, after de Casteljau. */
     for (int n = 0; n < 5; n++) right[n] = bernstein[n];

@@ -264,7 +264,8 @@ class Record(Shown):
     ended : ndarray, shape (N,)
         Indices into `REASONS`.
     events : ndarray, shape (E,), dtype `EVENT`
-        Sorted by time; at one time by particle, then in the order of recording.
+        Sorted by time; at one time by particle, then in the order of recording. In a family by
+        particle, then by time.
     by_surface : ndarray, shape (len(surfaces), 3)
         Ledger entries (J) of each surface, summed over particles. Only in a family of machines (see
         `chutelab.engines.exact`) those of each particle, (N, len(surfaces), 3).

@@ -287,15 +287,16 @@ class Recorder:
         one = len(self._events) == 1
         events = _joined(self._events, EVENT)
         t = events["t"]
-        if count > 1 or (times := t.tolist()) != sorted(times):
+        # The exact engine has those of a family particle by particle, and there they stay.
+        if self.machine.family is None and (count > 1 or (times := t.tolist()) != sorted(times)):
             # At one time by particle, then as they came.
             t, particle = t.copy(), events["particle"].copy()
             in_turn = not np.count_nonzero(particle[1:] < particle[:-1])
             order = t.argsort(kind="stable") if in_turn else np.lexsort((particle, t))
             events = events.take(order)
         elif one:
-            # It may lie in the core's memory, so copy it.
-            events = np.frombuffer(bytearray(events.tobytes()), EVENT)
+            # It may lie in the core's memory, so copy it, as bytes.
+            events = np.array(events.view(np.uint8)).view(EVENT)
         if self._turned:
             knots, frame = knots.copy(), self.machine.frame
             for rows in (knots, events, *[self.impulses][: self.impulses.size]):

@@ -245,6 +245,30 @@ def test_two_balls_on_one_string_snap_to_one_speed_along_it():
     assert record.by_surface[-1, 1] == pytest.approx(0.1 * (0.5 - 2.0 * 0.125), rel=1e-12)
 
 
+def test_a_string_pulls_on_where_the_one_behind_it_goes_slack():
+    """A row turns as one; the outermost is struck inwards, the others stay on their circles."""
+    rate, apart, r = 3.0, 0.2, 0.01
+    out = np.array([cos(0.1 * rate), sin(0.1 * rate)])
+    on = np.array([-out[1], out[0]])
+    rows = [{"at": [apart * k, 0.0], "velocity": [0.0, apart * k * rate]} for k in (1, 2, 3)]
+    # It comes in at 2 m/s beside the outermost, which it meets after 0.1 s: they change speeds.
+    speed = 3.0 * apart * rate * on - 2.0 * out
+    at = (3.0 * apart + 2.0 * r) * out - 0.1 * speed
+    rows.append({"at": at.tolist(), "velocity": speed.tolist()})
+    strings = [{"particle": 1, "other": 0}, {"particle": 2, "other": 1}]
+    tables = scene(0.25, gravity=0.0, rod=[{"particle": 0, "from": [0.0, 0.0]}], string=strings)
+    rows = [row | {"interact": True, "restitution": 1.0} for row in rows]
+    run = simulate(tables | {"stream": rows})
+    assert run.contacts == 1
+    assert ledger_closes(run)
+    for particle in (0, 1):
+        away = np.hypot(*run.track(particle)["position"].T)
+        assert away == pytest.approx(apart * (particle + 1), abs=1e-12)
+    assert atan2(*run.track(1)["position"][-1][::-1]) == pytest.approx(0.25 * rate, abs=1e-6)
+    # Struck by what is as heavy, it has the other's speed inwards.
+    assert run.track(2)["velocity"][-1] == pytest.approx(speed, abs=1e-3)
+
+
 # Over a pulley
 
 

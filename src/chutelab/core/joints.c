@@ -32,8 +32,8 @@
 static double missed;
 /* Whether lengths are as far from what they are to be as steps that ended in rounding are not. */
 static int is_rough;
-/* End of the step that the pull is found for, s. */
-static double pulled_to;
+/* End of the step that the pull is found for, and its length, s. */
+static double pulled_to, pulled_for;
 
 /* Place and velocity of a particle a span after the step's beginning, and by what it has turned. */
 typedef struct { double x, y, turned; } Pose;
@@ -263,17 +263,28 @@ void forget_tugs(void) {
     }
 }
 
+/* By how much of its length a string that is let go though it is tight gets longer within h. */
+static double longer(const Joint *j, double h) {
+    double d[4];
+    if (j->kind != STRING || !j->tied || W.joint_rows[j->row].on || !is_tight(j)) return 0;
+    between(j, h, d);
+    return length_of(d) / j->length - 1;
+}
+
 /* Find the forces of all joints in a step of length h, from the velocities as they are without them. A string
    that would push is let go. They begin with what was found last, unless that missed. */
 void pull_joints(double h) {
     int strings = 1, anew = missed > 0;
+    /* A shorter step pulls less: lengths tell nothing of what is brief. */
+    double share = pulled_for > h ? h / pulled_for : 1;
     missed = 0;
     pulled_to = W.step_end;
+    pulled_for = h;
     for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
         JointRow *r = W.joint_rows + j->row;
         for (int n = 0; n < rows_of(j); n++) {
             r[n].on = j->tied && h > 0 && (j->kind != STRING || j->taut || is_tight(j));
-            if (!r[n].on || anew) r[n].kick = 0;
+            r[n].kick *= r[n].on && !anew ? share : 0;
         }
     }
     for (int again = 0; strings && again < LETS_GO; again++) {
@@ -313,15 +324,17 @@ void pull_joints(double h) {
             r->kick = 0;
             strings = 1;
         }
+        /* Where one does not push any more, since another has been let go, it pulls after all. */
+        int goes_on = !strings && again < LETS_GO - 1;
+        for (const Joint *j = W.joints; j < W.joints + W.joint_count && goes_on; j++) {
+            if (!(longer(j, h) > BAND)) continue;
+            W.joint_rows[j->row].on = 1;
+            strings = 1;
+        }
     }
     pull();
     /* One that is let go since it would push, and yet gets longer, asks for a shorter step. */
-    for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
-        double d[4];
-        if (j->kind != STRING || !j->tied || W.joint_rows[j->row].on || !is_tight(j)) continue;
-        between(j, h, d);
-        missed = MAX(missed, length_of(d) / j->length - 1 - BAND);
-    }
+    for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) missed = MAX(missed, longer(j, h) - BAND);
 }
 
 /* The instant within (0, h] at which a string that is slack is pulled tight, INFINITY if it is not. */
@@ -450,7 +463,10 @@ static void aim_now(int taut) {
 static int let_go(void) {
     int found = 0;
     for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) {
-        if (!r->on || W.joints[r->joint].kind != STRING || r->off <= 0) continue;
+        const Disk *d = at_end(2 * r->joint);
+        /* What goes along its circle has no speed along the string but what rounding makes. */
+        double rounds = BAND * d->mass * (fabs(d->vx) + fabs(d->vy));
+        if (!r->on || W.joints[r->joint].kind != STRING || r->off <= rounds) continue;
         r->on = 0;
         found = 1;
     }

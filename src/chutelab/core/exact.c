@@ -1,53 +1,52 @@
-/* The exact engine: particles that meet no other, from event to event, one after the other.
+/* The exact engine: particles that meet no other, one after the other, from event to event.
 
-   A blow follows Newton restitution with Coulomb friction; flight, sliding on a face and being carried
-   have constant acceleration. A ride by adhesion is in closed form, one by friction goes step by step
-   along the arc. */
+   An impact follows Newton's restitution with Coulomb friction. Flight, sliding on a face and riding on the belt have
+   constant acceleration. A ride round the pulley by adhesion has a closed form; one with friction is computed in steps
+   along the circle. */
 
 #include "exact.h"
 #include "memory.h"
 
-/* Contacts in a row that take no time after which a particle has come to rest in its corner. An elastic
-   particle leaves a wedge of angle beta after pi/beta of them. */
+/* Number of consecutive contacts without time after which a particle counts as at rest in a corner. An elastic particle
+   leaves a wedge of angle beta after pi/beta contacts. */
 #define COLLAPSE (MOST_IDLE / 2)
-/* Restitution from which on they are no rest there: 40 of them take half of what does not slip. */
+/* Restitution from which on they do not count as rest: 40 impacts then take half of the normal velocity. */
 #define LASTING 0.9914
-/* Share of its age that an event of a particle must take to count as progress. */
+/* Share of a particle's age that an event must take to count as progress. */
 #define ROUNDING (4.0 * ULP)
-/* Share of the speeds involved below which a slip is rounding. */
+/* Share of the speeds involved; a smaller slip is rounding. */
 #define NO_SLIP 1e-13
-/* Share of the weight that a surface may seem to pull with, by rounding, where it holds nothing. */
+/* Share of the weight; a smaller pull away from a surface is rounding. */
 #define WEIGHTLESS 1e-9
-/* m/s times `Lone.pace`, as the two that follow; an approach this slow is a touch, not a blow. */
+/* m/s times `Lone.pace`, like the two that follow; a slower approach is no impact. */
 #define NEGLIGIBLE 1e-12
-/* A rebound this slow is summed with all that would follow it: u_n (1 + e)/(1 - e) of normal impulse in
-   the time 2 u_n/(g_n (1 - e)). At e = 0.999 some 20,000 bounces come before. At e = 1 such a rebound,
-   1e-19 m high, is taken for rest. */
+/* A rebound this slow is summed with all that would follow: u_n (1 + e)/(1 - e) of normal impulse per mass in the time 2
+   u_n/(g_n (1 - e)). At e = 0.999 some 20,000 bounces come before. At e = 1 such a rebound, 1e-19 m high, counts as rest. */
 #define REST 1e-9
 /* A particle this slow that goes to and fro between two obstacles is coming to rest there. */
 #define CRAWL (1000.0 * REST)
 /* Sine of the angle at which two surfaces must meet to hold a particle between them. */
 #define OPPOSED 1e-9
-/* Turns in which friction and rolling friction take their shares of a blow: each changes what the other
-   has to stop by 5/7 at most. */
+/* Greatest number of rounds for friction and rolling friction of an impact: each changes what the other has to stop, by
+   5/7 at most. */
 #define SHARES 100
-/* Effective mass over m at the rim of a free disk, with I = m r2/2: an impulse moves the contact point 3
-   times as much as it would a particle that does not turn. */
+/* Effective mass over m at the rim of a free disk, with I = m r2/2: an impulse changes the velocity of the contact point
+   3 times as much as for a particle that does not rotate. */
 #define DISK_SHARE (1.0 / 3.0)
-/* Knots and events that a round may write. */
+/* Greatest number of knots and events that a round writes. */
 #define ROUND_KNOTS 400
 #define ROUND_EVENTS 32
 
 Exact E;
 Particle A;
 
-static int course; /* what a round came to */
+static int course; /* result of a round */
 
 static int member_of(int lone) { return E.each ? lone / E.each : 0; }
 
 EXPORT Exact *exact(void) { return &E; }
 
-/* What is recorded. */
+/* Records. */
 
 static void write_knot(void) {
     const double *b = A.entries;
@@ -62,14 +61,14 @@ static void write_event(int kind, int surface) {
                                          { A.vx, A.vy, spin }, 0.0, 0.0, E.lone, NONE, kind, surface };
 }
 
-/* Loads are told up to here: in flight there are none. */
+/* Loads have been reported up to here; in flight there are none. */
 static void tell_here(void) {
     double now[] = { A.age, A.x, A.y, A.vx, A.vy, A.z };
     for (int n = 0; n < 6; n++) A.told[n] = now[n];
 }
 
-/* Tell that a surface bore the particle since loads were told last: it gave what changed the velocity, and what
-   gravity would have. It is `depth` (m) below the centre. */
+/* Report the load by the particle on a surface since the last report: the surface gave the change of the velocity, and
+   what gravity took. It is `depth` (m) below the centre. */
 static void bear_since(int surface, double nx, double ny, double depth) {
     double span = A.age - A.told[0], mass = A.given->mass, from = A.given->release + A.told[0];
     if (B.every > 0.0) {
@@ -77,7 +76,7 @@ static void bear_since(int surface, double nx, double ny, double depth) {
                    .y = A.told[2] - depth * ny, .nx = nx, .ny = ny, .jx = mass * (A.vx - A.told[3]),
                    .jy = mass * (A.vy - A.told[4] + A.given->gravity * span) };
         if (span > 0.0) {
-            /* The parabola to where the particle is, as fast as it is there. */
+            /* The parabola from there to the present place with the present velocity at its end. */
             double rate = 1.0 / span;
             p.ax = 2.0 * rate * (A.vx - rate * (A.x - A.told[1]));
             p.ay = 2.0 * rate * (A.vy - rate * (A.y - A.told[2]));
@@ -106,18 +105,18 @@ static void end_track(int reason) {
 
 static void part_from(int surface) { write_event(SEPARATION, surface); }
 
-/* Let the particle go, away from the obstacle it touched, or all those of a joint. */
+/* Let the particle leave the obstacle it touched, or all those of a joint. */
 static void let_go(int left, int side, int order, int joint) {
     A.way = FLIES;
     A.on = NONE, A.side = 0, A.slip = 1.0;
     A.left = left, A.left_side = side, A.order = order, A.joint = joint;
 }
 
-/* What a contact is like. */
+/* Properties of a contact. */
 
 static int epoch_now(void) { return epoch_at(A.age); }
 
-/* Age at which the next gate opens or shuts, or the run is over. */
+/* Age at which the next gate changes, or the run ends. */
 static double next_change(void) {
     int epoch = epoch_now();
     double stop = A.given->stop;
@@ -135,16 +134,15 @@ static void normal_at(const Obstacle *o, int side, double *nx, double *ny) {
     *nx = x / distance, *ny = y / distance;
 }
 
-/* Which half of a circle a normal is on: 1, or -1 away from the crown; the inside of an arc is -1. Round
-   the end of a segment of speed v the surface moves with v or -v along (n_y, -n_x), which is v along the
-   segment on both its faces. */
+/* The half of a circle that a normal points to: 1, or -1 away from the crown; inside an arc it is -1. Round the end of a
+   segment with speed v the surface moves with v or -v along (n_y, -n_x), which on both its faces is v along the segment. */
 static int rim_side(const Obstacle *o, double nx, double ny) {
     int half = nx * o->crown[0] + ny * o->crown[1] >= 0.0 ? 1 : -1;
     return o->rho < 0.0 ? -half : half;
 }
 
-/* What a contact with an obstacle is like where the particle is now. The side of a circle may be left
-   open, 0: it is that where it is. */
+/* The contact with an obstacle at the particle's present place. If the side of a circle is 0, it is found from that
+   place. */
 static Touch touch_of(int obstacle, int side) {
     const Obstacle *o = O.all + obstacle;
     int columns = E.segment_count + E.arc_count + (E.wheel_count > 0);
@@ -166,13 +164,13 @@ static double weight_along(const Touch *c) { return A.given->gravity * c->nx; }
 
 static void go_along(const Touch *c, double pace) { A.vx = pace * c->tx, A.vy = pace * c->ty; }
 
-/* Slip of the contact point against the surface at a pace, m/s; exactly 0 below rounding. */
+/* Slip of the contact point on the surface at a speed along it, m/s; exactly 0 if it is rounding. */
 static double slip_of(const Touch *c, double pace) {
     double slip = pace + A.z - c->belt;
     return fabs(slip) <= NO_SLIP * (fabs(pace) + fabs(c->belt) + fabs(A.z)) ? 0.0 : slip;
 }
 
-/* Take a slip that is used up to exactly zero: off the spin, else off the pace that is returned. */
+/* Make a vanished slip exactly zero: change the spin, or if it doesn't rotate the speed. Return the speed. */
 static double stop_slip(double belt, double pace) {
     if (!A.turns) return belt;
     A.z = belt - pace;
@@ -185,14 +183,14 @@ static double surface_spin(int obstacle) {
     return A.given->radius * (o->met == WHEEL ? -o->speed / o->bend : o->turning);
 }
 
-/* Most that friction can give; infinite where it is, also without a normal force. */
+/* Greatest friction; infinite if the coefficient is, even without a normal force. */
 static double grip_limit(double friction, double normal) {
     return isinf(friction) ? INFINITY : friction * normal;
 }
 
 static double limited(double value, double most) { return MIN(MAX(value, -most), most); }
 
-/* Put the particle exactly at contact distance, so that rounding cannot add up. */
+/* Move the particle exactly to contact distance, so that rounding does not add up. */
 static void snap(int obstacle, int side) {
     const Obstacle *o = O.all + obstacle;
     if (o->met == FACE) {
@@ -211,9 +209,9 @@ static double load_on(const Touch *c) {
     return weight_on(c) - (o->met == FACE ? 0.0 : square(along(c)) / o->rho);
 }
 
-/* Whether an obstacle bears the particle: by a positive load, or one that is about to be. Where a path
-   round a circle gets steeper towards the weight, the hops of a particle shrink towards the point of zero
-   load, and by rounding its load there is never above 0. */
+/* Whether an obstacle supports the particle: with a positive load, or one that is about to become positive. Where a path
+   round a circle turns towards the weight, the hops of a particle shrink towards the point of zero load, and with
+   rounding its load there is never above 0. */
 static int is_pressed(const Touch *c) {
     const Obstacle *o = O.all + c->obstacle;
     double load = load_on(c);
@@ -222,11 +220,10 @@ static int is_pressed(const Touch *c) {
         && along(c) * weight_along(c) / o->rho < 0.0;
 }
 
-/* What a contact does. */
+/* Effects of a contact. */
 
-/* Change the spin by the tangential impulse per mass that goes with a normal one; rolling friction has
-   its share in that. Returns the tangential impulse per mass, and by how much the slip changes (m/s), and
-   work and heat of rolling friction (J). */
+/* Change the spin by the tangential impulse that goes with a normal one (both per mass), and by rolling friction. Return
+   the tangential impulse per mass; set the change of the slip, m/s, and the work and heat of rolling friction, J. */
 static double rub(const Touch *c, double slip, double normal, double *change, double *work, double *heat) {
     double grip = grip_limit(c->friction, normal), push = limited(-A.share * slip, grip);
     *work = *heat = 0.0;
@@ -235,7 +232,7 @@ static double rub(const Touch *c, double slip, double normal, double *change, do
         *change = push / A.share;
         return push;
     }
-    /* Friction stops the slip as far as mu J_n allows, rolling friction the spin as far as kappa J_n does. */
+    /* Friction stops the slip, up to mu J_n; rolling friction stops the spin, up to kappa J_n. */
     double turn = surface_spin(c->obstacle), spin = A.z - turn, most = A.given->rolling * normal, couple = 0.0;
     for (int n = 0; n < SHARES && most > 0.0; n++) {
         couple = limited(-spin / A.lever - push, most);
@@ -251,13 +248,13 @@ static double rub(const Touch *c, double slip, double normal, double *change, do
     return push;
 }
 
-/* A blow: change the velocities, book the energies, write event and knot. */
-static void blow(const Touch *c, double approach, double rebound, int lands) {
+/* An impact: change the velocities, book the energies, write event and knot. */
+static void resolve_impact(const Touch *c, double approach, double rebound, int lands) {
     double vx = A.vx, vy = A.vy, spin = A.turns ? A.z / A.given->radius : 0.0, mass = A.given->mass;
     double pace = along(c), slip = slip_of(c, pace), change, work, heat;
     double normal = (1.0 + c->restitution) * approach;
     double push = rub(c, slip, normal, &change, &work, &heat);
-    /* The normal speed is set, not added to: e |v_n| to the last bit. */
+    /* The normal speed is set, not changed: it is e |v_n| to the last bit. */
     A.vx = rebound * c->nx + (pace + push) * c->tx;
     A.vy = rebound * c->ny + (pace + push) * c->ty;
     book(c->surface, mass * push * c->belt + work,
@@ -273,16 +270,17 @@ static void blow(const Touch *c, double approach, double rebound, int lands) {
     e->normal = mass * normal, e->tangent = mass * push;
 }
 
-/* Choose between turning and not where rolling friction acts. `tends` is what makes the contact point
-   slip, m/s2, `share` how much of it friction must take up to hold it; returns whether it can rest. */
+/* Choose between rotating and not, with rolling friction. `tends` is the acceleration of the slip, m/s2, `share` the part
+   of it that friction must supply to hold it. Return whether the particle can be at rest. */
 static int settle_roll(const Touch *c, double slip, double load, double grip, double *tends, double *share) {
     double most = A.given->rolling * load, pull = *tends;
     double spin = A.z - surface_spin(A.on);
     int turns = fabs(spin) > NO_SLIP * (fabs(A.z) + fabs(c->belt)), still = slip == 0.0;
     if (!turns) A.z -= spin;
-    /* Without slip the pull must turn it, with slip friction does. */
+    /* Without slip the pull must make it rotate, with slip friction does. */
     int holds = still ? fabs(pull) <= most && fabs(pull) <= grip : grip <= most;
-    /* It starts to turn as the force at the rim has it; sliding wins where friction gives way. */
+    /* It begins to rotate in the direction of the force at the rim; it slides instead if friction is the weaker of the
+       two. */
     int slides = still && grip <= most;
     A.roll = turns ? sign_of(spin) : holds || slides ? 0.0 : -sign_of(still ? pull : slip);
     if (A.roll == 0.0) {
@@ -293,15 +291,15 @@ static int settle_roll(const Touch *c, double slip, double load, double grip, do
     return 0;
 }
 
-/* Choose between gripping and slipping, and end tracks that have settled. Without slip, friction must
-   hold against gravity: share |g_t| <= mu N. Where it cannot, slip starts the way gravity pulls. */
+/* Choose between gripping and slipping, and end tracks that have settled. Without slip, friction must hold against
+   gravity: share |g_t| <= mu N. If it cannot, slip begins in the direction of gravity. */
 static void settle(void) {
     Touch c = touch_now();
     double pace = along(&c), slip = slip_of(&c, pace);
     int arc = A.way == ON_ARC;
     if (isinf(c.friction) && slip != 0.0) {
-        /* Friction without bound stops a slip without a normal impulse. */
-        blow(&c, 0.0, 0.0, 0);
+        /* Infinite friction stops a slip even without a normal impulse. */
+        resolve_impact(&c, 0.0, 0.0, 0);
         pace = along(&c), slip = slip_of(&c, pace);
     }
     int still = slip == 0.0;
@@ -315,14 +313,14 @@ static void settle(void) {
     A.slip = grips ? 0.0 : still ? sign_of(tends) : sign_of(slip);
     if (begins) write_event(STICK, c.surface);
     if (E.until != UNTIL_SETTLED) return;
-    /* Rolling down a slope is not lying on it. */
+    /* A particle that rolls down a slope is not at rest. */
     int steady = grips && rests && !(arc && pace != 0.0);
     if (!steady || !(c.belt == 0.0 || c.surface == E.landing) || !isinf(vanishes(A.on))) return;
     write_event(SETTLE, c.surface);
     end_track(HAS_SETTLED);
 }
 
-/* Make a spin that is used up exactly that of the surface, then see what goes on. */
+/* Make a vanished spin exactly that of the surface, then see what follows. */
 static void end_roll(void) {
     Touch c = touch_now();
     A.z = surface_spin(A.on);
@@ -330,7 +328,7 @@ static void end_roll(void) {
     settle();
 }
 
-/* Make a slip that is used up exactly zero, then see whether friction holds. */
+/* Make a vanished slip exactly zero, then see whether friction holds. */
 static void end_slip(void) {
     Touch c = touch_now();
     double pace = stop_slip(c.belt, along(&c));
@@ -338,8 +336,8 @@ static void end_slip(void) {
     settle();
 }
 
-/* What acts on a face, per mass: friction along the tangent and, over r, the couple of rolling friction;
-   returns the acceleration along the tangent. */
+/* Forces on a face, per mass: friction along the tangent and, over r, the moment of rolling friction. Return the
+   acceleration along the tangent. */
 static double face_force(const Touch *c, double *force, double *couple) {
     double pull = weight_along(c), load = weight_on(c), tends = pull, share = A.share;
     int rolls = A.turns && A.given->rolling > 0.0, held = rolls && A.roll == 0.0, grips = A.slip == 0.0;
@@ -361,22 +359,22 @@ static void look_round(void) {
     find_bounds(A.on, A.side, A.angle, epoch_now(), A.bounds);
 }
 
-/* What the particle is on, or came from at the beginning of the stretch. */
+/* The obstacle that the particle touches, or left at the beginning of the stretch, and its face. */
 static int touched_before(int *side) {
     *side = A.on == NONE ? A.left_side : A.side;
     return A.on == NONE ? A.left : A.on;
 }
 
-/* Sum the bounces after a rebound slower than REST, geometric in time and impulse. */
+/* Sum the bounces after a rebound slower than REST: their times and impulses are geometric series. */
 static void last_bounces(int obstacle, int side, double u) {
     if (!(u > 0.0) || obstacle >= O.faces) return;
     Touch c = touch_of(obstacle, side);
     double weight = weight_on(&c), pull = weight_along(&c), mass = A.given->mass, change, work, heat;
-    /* Without loss the series never ends; its motion is below what is resolved, so it is dropped. */
+    /* Without loss the series has no end; its motion is smaller than what is resolved, and is left out. */
     double lost = c.restitution < 1.0 ? 1.0 - c.restitution : INFINITY;
     double time = MIN(2.0 * u / (weight * lost), A.given->stop - A.age);
     int face, before = touched_before(&face);
-    /* Straight from another obstacle: it is in the way. */
+    /* It came from another obstacle, which is in the way. */
     if (before != NONE && before != obstacle) time = 0.0;
     double pace = along(&c), way = time * (pace + 0.5 * pull * time);
     A.age += time;
@@ -391,7 +389,7 @@ static void last_bounces(int obstacle, int side, double u) {
     write_knot();
 }
 
-/* Begin sliding, gripping or riding on an obstacle. */
+/* Begin to slide, grip or ride on an obstacle. */
 static void rest_on(int obstacle, int side, double rebound) {
     last_bounces(obstacle, side, rebound);
     A.way = obstacle < O.faces ? ON_FACE : ON_ARC;
@@ -401,14 +399,14 @@ static void rest_on(int obstacle, int side, double rebound) {
     settle();
 }
 
-/* Friction of a surface that slides under a resting particle, else 0. */
+/* Coefficient of friction of a moving surface, 0 if it is at rest or friction is infinite. */
 static double grip_of(const Touch *c) {
     return c->belt == 0.0 || isinf(c->friction) ? 0.0 : c->friction;
 }
 
 static double cross(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
 
-/* The two normal forces per mass that hold a particle in a corner; returns whether it is locked there. */
+/* The normal forces per mass of two surfaces that hold a particle in a corner. Return whether friction locks it there. */
 static int corner_loads(const Touch *a, const Touch *b, double *loads) {
     const Touch *both[] = { a, b };
     double g = A.given->gravity, x[2], y[2];
@@ -432,12 +430,12 @@ static int corner_loads(const Touch *a, const Touch *b, double *loads) {
 
 /* Bring the particle to rest in the corner of two obstacles, each given with its side.
 
-   A moving surface under it goes on doing work, all of it heat. Where a surface is at rest its friction is
-   taken as zero: it dissipates nothing, and the balance of the two normal forces needs none. Where friction
-   pulls the particle in harder than any load can hold it (self-locking, as with adhesion) a real drive would
-   stall: the particle stays, and nothing more is booked. Where gravity pulls out of the corner it falls,
-   from rest, or rests on the other obstacle alone. */
-static void hold(int on, int side, int other, int other_side) {
+   A moving surface continues to do work, all of which becomes heat. The friction of a surface at rest counts as zero: it
+   dissipates nothing, and the balance of the two normal forces doesn't need it. If friction pulls the particle in with
+   more than any normal force can balance (self-locking, as with adhesion), a real drive would stall: the particle stays,
+   and nothing more is booked. If gravity pulls it out of the corner, it falls from rest, or rests on the other obstacle
+   alone. */
+static void rest_in_corner(int on, int side, int other, int other_side) {
     Touch a = touch_of(on, side), b = touch_of(other, other_side);
     const Touch *both[] = { &a, &b };
     int moving = a.belt != 0.0 || b.belt != 0.0;
@@ -462,7 +460,7 @@ static void hold(int on, int side, int other, int other_side) {
         else let_go(other, other_side, 2, NONE);
         return;
     }
-    /* A gate lets it out of the corner when it opens, and that is at the end of the wait. */
+    /* A gate that opens lets it out of the corner: the wait ends then. */
     double gone[] = { vanishes(on), vanishes(other) }, first = MIN(gone[0], gone[1]);
     int opens = first < A.given->stop;
     if (!moving && E.until == UNTIL_SETTLED && isinf(first)) {
@@ -496,7 +494,7 @@ static void hold(int on, int side, int other, int other_side) {
             rest_on(n ? on : other, n ? side : other_side, 0.0);
 }
 
-/* Stop the particle if it goes to and fro between two obstacles without progress; tell whether. */
+/* Stop the particle if it goes to and fro between two obstacles without progress; return whether it did. */
 static int stop_jammed(int obstacle, int side) {
     int face, before = touched_before(&face);
     int slow = length_of(A.vx, A.vy) <= CRAWL * A.given->pace;
@@ -506,22 +504,21 @@ static int stop_jammed(int obstacle, int side) {
     /* Faces that lie on each other make no corner. */
     Touch one = touch_of(before, face), two = touch_of(obstacle, side);
     if (!(fabs(cross(one.nx, one.ny, two.nx, two.ny)) > OPPOSED)) return 0;
-    /* What hardly loses anything in a blow, and does not turn, gets as much of belts at each: their work has
-       no bound. */
+    /* A particle that loses hardly any energy in an impact, and does not rotate, gains from belts at each one: their work
+       has no bound. */
     double best = MAX(one.restitution, two.restitution);
     if (!slow && !A.turns && best > LASTING && (one.belt != 0.0 || two.belt != 0.0)) {
         E.passed = 0.0;
         course = DRIVEN;
     } else {
-        hold(before, face, obstacle, side);
+        rest_in_corner(before, face, obstacle, side);
     }
     return 1;
 }
 
-/* Go on sliding after a blow from another obstacle, or stay in the corner of the two. A touch ends the
-   approach along what it slides on: where the two are not at right angles it takes but a part of it, and
-   the next touch would follow at once. What is faster meets something that is all but parallel, and goes
-   on. */
+/* After an impact with another obstacle, continue to slide, or stay in the corner of the two. A soft contact ends the
+   approach along the face: where the two are not at right angles it stops only a part of it, and the next contact would
+   follow at once. A faster particle meets something almost parallel, and continues. */
 static void slide_past(int obstacle, int side, double rebound, int soft) {
     Touch c = touch_now(), against = touch_of(obstacle, side);
     A.left = obstacle, A.left_side = side;
@@ -535,7 +532,7 @@ static void slide_past(int obstacle, int side, double rebound, int soft) {
     double force, couple, pull = face_force(&c, &force, &couple);
     double towards = pull * c.tx * against.nx + pull * c.ty * against.ny;
     double size = length_of(pull * c.tx, pull * c.ty);
-    if (rebound <= REST * A.given->pace && towards < -OPPOSED * size) hold(A.on, A.side, obstacle, side);
+    if (rebound <= REST * A.given->pace && towards < -OPPOSED * size) rest_in_corner(A.on, A.side, obstacle, side);
 }
 
 /* Resolve a contact with an obstacle that has just been reached. */
@@ -545,12 +542,12 @@ static void strike(int obstacle, int side) {
     Touch c = touch_of(obstacle, side);
     double approach = MAX(-(A.vx * c.nx + A.vy * c.ny), 0.0);
     int soft = approach <= NEGLIGIBLE * A.given->pace;
-    /* A contact that yields: above 1 / falls the restitution goes with v^(-1/4). */
+    /* Restitution that falls with speed: above 1 / falls it goes with v^(-1/4). */
     if (c.falls * approach > 1.0) c.restitution /= sqrt(sqrt(c.falls * approach));
     if (soft) c.restitution = 0.0;
     double rebound = c.restitution * approach;
     int lands = c.surface == E.landing && !A.landed;
-    blow(&c, approach, rebound, lands);
+    resolve_impact(&c, approach, rebound, lands);
     if (lands) {
         A.landed = 1;
         if (E.until == UNTIL_LANDED) {
@@ -560,7 +557,7 @@ static void strike(int obstacle, int side) {
     }
     if (stop_jammed(obstacle, side)) return;
     if (A.way >= ON_FACE) {
-        /* A blow from elsewhere may leave it on what it slides or rides on. */
+        /* After an impact with another obstacle it may stay on the one that it slides or rides on. */
         Touch under = touch_now();
         if (fabs(A.vx * under.nx + A.vy * under.ny) <= NEGLIGIBLE * A.given->pace && is_pressed(&under)) {
             slide_past(obstacle, side, rebound, soft);
@@ -575,7 +572,7 @@ static void strike(int obstacle, int side) {
     let_go(obstacle, side, rebound > 0.0 ? 1 : 2, NONE);
 }
 
-/* Go on from the end of a face or an arc on what follows, or fly if nothing holds there. */
+/* Continue from the end of a face or an arc on what follows, or fly if nothing supports it there. */
 static void go_on(int obstacle, int side, int joint) {
     int ends = obstacle == NONE, left = A.on, face = A.side;
     if (ends) obstacle = left, side = face;
@@ -588,7 +585,7 @@ static void go_on(int obstacle, int side, int joint) {
         let_go(flush ? obstacle : left, flush ? side : face, 2, joint);
         return;
     }
-    /* Another surface is come on to without a blow: what it did on the one before ends there. */
+    /* It moves onto another surface without an impact: stick and slip on the one before end there. */
     int onto = o->surface != from->surface;
     if (onto) {
         A.slip = 1.0;
@@ -603,17 +600,16 @@ static void go_on(int obstacle, int side, int joint) {
         }
     }
     rest_on(obstacle, side, 0.0);
-    /* A slight bend turns the way: without a knot behind it the cubic from there on would be pressed into the
-       next face. */
+    /* A slight bend turns the path: without a knot after it the next cubic would reach into the next face. */
     const Knot *before = E.knots + E.knot_count - 1;
     double turned = length_of(A.vx - before->vx, A.vy - before->vy);
     if (turned > COLLINEAR * length_of(A.vx, A.vy)) write_knot();
     if (onto && A.slip != 0.0) write_event(SLIP, o->surface);
 }
 
-/* How it moves between events. */
+/* Motion between events. */
 
-/* Count events in a row that take no time. */
+/* Count consecutive events that take no time. */
 static void count_idle(double dt) {
     A.idle = dt > ROUNDING * A.age ? 0 : A.idle + 1;
     if (A.idle > MOST_IDLE) course = NO_PROGRESS;
@@ -623,7 +619,7 @@ static Motion motion_of(double ax, double ay) {
     return (Motion){ A.x, A.y, A.vx, A.vy, ax, ay, A.left, A.left_side, A.order, NONE, NONE, 0, 0 };
 }
 
-/* Carry the state over a stretch. */
+/* Move the particle for a time dt. */
 static void move(const Motion *m, double dt) {
     double half = 0.5 * dt;
     A.age += dt;
@@ -631,7 +627,7 @@ static void move(const Motion *m, double dt) {
     A.vx = m->vx + dt * m->ax, A.vy = m->vy + dt * m->ay;
 }
 
-/* Time until a gap closes, at once if it is closed; infinite if that was in the past or never is. */
+/* Time until a gap closes, 0 if it is closed; infinite if that was in the past or never happens. */
 static double when(double gap, double rate, double acceleration) {
     double time = descent(MAX(gap, 0.0), rate, acceleration);
     return time >= 0.0 ? time : INFINITY;
@@ -642,7 +638,7 @@ static void stop_now(void) {
     end_track(TIME_IS_OVER);
 }
 
-/* Let the particle go from what vanishes under it now. */
+/* Let the particle leave a surface that vanishes under it now. */
 static void drop(void) {
     part_from(O.all[A.on].surface);
     let_go(NONE, 0, 0, NONE);
@@ -679,7 +675,7 @@ static void put_round(double rho, double phi, double pace, double x, double y) {
     A.vx = pace * across, A.vy = -pace * up;
 }
 
-/* Carry the particle by adhesion round the pulley, from an angle until cos phi1 = v2/(g rho). */
+/* Carry the particle by adhesion round the pulley, from an angle to cos phi1 = v2/(g rho). */
 static void carry_round(double start, double pace) {
     const Obstacle *pulley = O.all + O.pulley;
     Bound found[2];
@@ -692,7 +688,7 @@ static void carry_round(double start, double pace) {
     if (level < across) {
         Obstacle own = *pulley;
         end = angle_of_cosine(level);
-        /* A ride on a bed is further out than one on the pulley itself. */
+        /* A particle high in the bed rides further out than one on the pulley itself. */
         O.all[O.pulley].rho = rho;
         find_bounds(O.pulley, 1, start, epoch_now(), found);
         O.all[O.pulley] = own;
@@ -705,7 +701,7 @@ static void carry_round(double start, double pace) {
             double turn = way * (n / parts);
             put_round(rho, start + turn, pace, 0.0, 0.0);
             A.age = begin + rho * turn / pace;
-            /* The belt lifts the particle, or lets it down: F v = -m g v sin phi, from the last knot on. */
+            /* The belt lifts the particle, or lets it down: F v = -m g v sin phi, since the last knot. */
             double height = rho * cosine(start + turn);
             book(pulley->surface, -A.given->mass * g * (above - height), 0.0, 0.0);
             above = height;
@@ -715,7 +711,7 @@ static void carry_round(double start, double pace) {
         }
         if (cut) A.age = stop;
     }
-    /* Where a gate opens or shuts the ride goes on, with another look at what is in the way. */
+    /* Where a gate changes, the ride continues after another check of what is in the way. */
     if (A.age >= A.given->stop) end_track(TIME_IS_OVER);
     else if (cut) return;
     else if (struck) strike(found[1].obstacle, found[1].side);
@@ -725,11 +721,11 @@ static void carry_round(double start, double pace) {
     }
 }
 
-/* Move the particle, which the belt carries, on to the pulley, or to what is in the way. */
+/* Move the particle along the belt to the pulley, or to what is in the way. */
 static void carry(void) {
     double up, across, incline = E.wheels[member_of(E.lone)].incline;
     sin_cos(incline, &up, &across);
-    /* One that was on the pulley when a gate opened or shut. */
+    /* It was on the pulley already when a gate changed. */
     if (O.change_count && A.x * across + A.y * up > O.touch) {
         carry_round(angle_of(A.x, A.y), length_of(A.vx, A.vy));
         return;
@@ -751,7 +747,7 @@ static void carry(void) {
     else carry_round(incline == 0.0 ? 0.0 : angle_of(-up, across), pace);
 }
 
-/* Move the particle on by one knot of a ride, or to the next event, and resolve it. */
+/* Move the particle by one step of a ride, or to the next event, and resolve that. */
 static void ride(void) {
     int circle = A.on;
     const Obstacle *o = O.all + circle;
@@ -765,7 +761,7 @@ static void ride(void) {
         let_go(circle, 0, 2, NONE);
         return;
     }
-    /* The angle goes on where a turn is complete. */
+    /* The angle goes on beyond a full turn. */
     phi += TURN * rint((A.angle - phi) / TURN);
     Circle state = { phi, along(&c), A.z, rho, A.given->gravity, c.friction, c.belt, A.slip, A.share,
                      A.bounds[0].angle, A.bounds[1].angle, rolls ? A.given->rolling : 0.0, A.roll, turn };
@@ -821,7 +817,7 @@ static void ride(void) {
     }
 }
 
-/* Go on at the end of a face: onto the next segment, round the end, or into flight. */
+/* Continue at the end of a face: on the next segment, round the end, or in flight. */
 static void leave_face(void) {
     const Obstacle *o = O.all + A.on;
     double foot = (A.x - o->x) * o->tx + (A.y - o->y) * o->ty;
@@ -831,7 +827,7 @@ static void leave_face(void) {
     else go_on(to.obstacle, to.side, O.tips[tip].sets[face]);
 }
 
-/* Move the particle on a face on to its next event and resolve it. */
+/* Move the particle on a face to its next event, and resolve that. */
 static void slide(void) {
     Touch c = touch_now();
     const Obstacle *o = O.all + A.on;
@@ -839,7 +835,7 @@ static void slide(void) {
     int rolls = A.turns && A.given->rolling > 0.0;
     Motion m = motion_of(pull * c.tx, pull * c.ty);
     m.on = A.on, m.on_side = A.side;
-    /* The slip is linear in time, while there is one. */
+    /* As long as there is slip, it is linear in time. */
     double slip = along(&c) + A.z - c.belt, twist = A.lever * (force + couple);
     double rate = (m.ax * c.tx + m.ay * c.ty) + twist, spin = A.z;
     double grips = A.slip * rate < 0.0 ? MAX(-slip / rate, 0.0) : INFINITY;
@@ -847,7 +843,7 @@ static void slide(void) {
     double foot = (A.x - o->x) * o->tx + (A.y - o->y) * o->ty;
     double pace = A.vx * o->tx + A.vy * o->ty, push = m.ax * o->tx + m.ay * o->ty;
     double ends = MIN(when(foot, pace, push), when(o->length - foot, -pace, -push));
-    /* What it lies on may vanish; that counts as a stop. */
+    /* If the surface vanishes, that counts as a stop. */
     double stop = MIN(A.given->stop, vanishes(A.on)), stops = MAX(stop - A.age, 0.0);
     double soonest = MIN(MIN(grips, halts), MIN(ends, stops)), dt = soonest;
     int obstacle, side, hits = first_contact(&m, &dt, &obstacle, &side);
@@ -858,7 +854,7 @@ static void slide(void) {
     move(&m, dt);
     snap(A.on, A.side);
     A.z += twist * dt;
-    /* What was left at the beginning is some way off now. */
+    /* What it left at the beginning is some distance away now. */
     if (dt > 0.0) A.left = NONE;
     bear_at(&c);
     write_knot();
@@ -874,7 +870,7 @@ static void slide(void) {
     else end_slip();
 }
 
-/* Start a particle; one whose time comes after the end of the run is over at once. */
+/* Start a particle; if it would start after the end of the run, it is over at once. */
 static void begin(void) {
     const Lone *p = E.lones + E.lone;
     double inertia = p->inertia, arm = p->mass * p->radius * p->radius;
@@ -883,7 +879,7 @@ static void begin(void) {
                     .way = p->carried ? RIDES_BELT : FLIES, .on = NONE, .slip = 1.0, .left = NONE, .joint = NONE };
     A.turns = inertia > 0.0;
     if (A.turns) A.share = inertia / (inertia + arm);
-    /* That of a disk is not to depend on the rounding of its I. */
+    /* For a disk it must not depend on the rounding of its I. */
     if (fabs(A.share - DISK_SHARE) < 1e-15) A.share = DISK_SHARE;
     A.lever = 1.0 / A.share - 1.0;
     fit_obstacles();
@@ -901,7 +897,7 @@ static void begin(void) {
     }
 }
 
-/* Take the particle to its next event. */
+/* Move the particle to its next event. */
 static void proceed(void) {
     if (A.way == OVER) return;
     if (A.rounds >= E.most) course = TOO_LONG;
@@ -920,7 +916,7 @@ static void proceed(void) {
     }
 }
 
-/* Lay out what the host fills in, and what is written. */
+/* Reserve the arrays that the host fills in, and those of the results. */
 EXPORT int lay_out_exact(void) {
     double members = E.each ? E.lone_count / E.each : 1, many = MIN(20.0 * E.lone_count, KEPT);
     RESERVE(E.segments, members * E.segment_count);
@@ -938,7 +934,7 @@ EXPORT int lay_out_exact(void) {
     return has_room();
 }
 
-/* Run all particles, for at most so many rounds; returns why it came back, see `enum Course`. */
+/* Run all particles for at most so many rounds; return why it stopped, see `enum Course`. */
 int follow_all(int rounds) {
     if (B.every > 0.0 && !B.bins && !lay_out_bins(E.surface_count, 0)) return NO_MEMORY;
     for (; E.lone < E.lone_count; E.lone++, E.begun = 0) {

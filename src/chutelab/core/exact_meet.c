@@ -1,40 +1,40 @@
 /* What a particle meets next, and when: solved, not stepped.
 
-   A gap is a polynomial in time, positive while two things are apart. Only the crossing from positive
-   to negative is a contact; the other one is a departure. In flight, or sliding straight, a particle
-   may meet a face or a circle (an end, an arc from outside or inside, the pulley). A ride round a
-   circle is stopped by something else at an angle in closed form. */
+   A gap is a polynomial in time, positive while two things are apart. Only a crossing from positive to negative is a
+   contact; the opposite one is a departure. In flight, or sliding straight, a particle may meet a face or a circle (an
+   end, an arc from outside or inside, the pulley). For a ride round a circle the angle at which something stops it has a
+   closed form. */
 
 #include "exact.h"
 
-/* Share of a speed or an acceleration along a surface below which it has no part towards it. */
+/* Share of a speed or an acceleration along a surface; a smaller part towards the surface is rounding. */
 #define PARALLEL 1e-14
-/* Share of the speed towards a circle below which a Newton step would not improve the contact. */
+/* Share of the speed; with a smaller part towards a circle, a Newton step would not improve the contact. */
 #define GLANCING 1e-3
-/* Least order with which a circle is left for good, unless the pull turns a path back. */
+/* Least order of contact with which a circle is left for good, unless acceleration turns the path back. */
 #define FROM_CURVE 2
-/* Bound on the refinements of a root: Newton's method takes about 8, by halving alone this. */
+/* Greatest number of refinements of a root: Newton's method takes about 8, bisection alone this many. */
 #define REFINEMENTS 120
-/* Halvings of a time after which a polynomial with two roots in it is a parabola that is still larger than its rounding;
-   steps to where that turns back; and descents of a polynomial of degree 4: it has two, and by rounding another one or
-   two. */
+/* Halvings of an interval after which a polynomial with two roots in it is practically a parabola, but still larger than
+   its rounding; Newton steps to where that turns back; and greatest number of descents of a polynomial of degree 4: it
+   has two, and by rounding one or two more. */
 #define HALVINGS 20
 #define TURNINGS 4
 #define MOST_ROOTS 4
-/* rad; an obstacle this close to the present angle is met now: by rounding it may be passed. */
+/* rad; an obstacle this near to the present angle is met now, although by rounding it may be behind. */
 #define NOW 2e-11
-/* In `touch`; circles whose centres and radii differ by no more are in one place. */
+/* In `touch`; circles whose centres and radii differ by no more are at the same place. */
 #define ALIKE 4.0
 
-/* When gap + rate t + acceleration t^2/2 crosses zero downwards; NaN or infinite if never, and
-   negative where that was in the past.
+/* Time at which gap + rate t + acceleration t^2/2 crosses zero downwards; NaN or infinite if it never does, negative if
+   it did in the past.
 
-   A parabola crosses any level downwards at most once, with derivative -S, where
-   S^2 = rate^2 - 2 acceleration gap. Of the two forms of that root the one without cancellation is
-   taken: 2 gap / (S - rate) while closing, -(rate + S) / acceleration while opening. */
+   A parabola crosses any level downwards at most once, with derivative -S, where S^2 = rate^2 - 2 acceleration gap. Of
+   both forms of that root, the one without cancellation is used: 2 gap / (S - rate) while closing, -(rate + S) /
+   acceleration while opening. */
 double descent(double gap, double rate, double acceleration) {
     double span = fabs(rate) + sqrt(rate * rate - (acceleration + acceleration) * gap);
-    /* Neither gap nor rate: it closes at once if it is pulled. */
+    /* With zero gap and rate it closes at once if the acceleration is downwards. */
     if (span == 0.0 && gap == 0.0 && acceleration < 0.0) return 0.0;
     return rate > 0.0 ? span / -acceleration : (gap + gap) / span;
 }
@@ -46,8 +46,8 @@ double polynomial(const double *c, int count, double t) {
     return value;
 }
 
-/* Where a polynomial of degree 4 that is positive at `low` and negative at `high`, but for rounding, and crosses
-   zero once between is zero: Newton's method inside a shrinking bracket, halving where it would leave it. */
+/* The root of a polynomial of degree 4 that is positive at `low`, negative at `high` (within rounding) and crosses zero
+   once between: Newton's method inside a shrinking bracket, with bisection where a step would leave it. */
 static double crossing(const double *c, double low, double high) {
     if (!(polynomial(c, 5, low) > 0.0)) return low;
     if (!(polynomial(c, 5, high) < 0.0)) return high;
@@ -64,7 +64,7 @@ static double crossing(const double *c, double low, double high) {
     return t;
 }
 
-/* Where a polynomial of degree 4 that is all but a parabola there turns back: Newton's method on its slope. */
+/* Where a polynomial of degree 4 that is practically a parabola turns back: Newton's method on its slope. */
 static double turning_point(const double *c, double low, double high) {
     double t = 0.5 * (low + high);
     for (int n = 0; n < TURNINGS; n++) {
@@ -75,10 +75,10 @@ static double turning_point(const double *c, double low, double high) {
     return t;
 }
 
-/* Find where a polynomial of degree 4 becomes negative from `low` to `high`, in order; returns how many such t were
-   found by then. Its Bernstein coefficients there change sign as often as it has roots, or two or four times more:
-   what may have several is halved. Where that does not part two, it tells by where the polynomial turns back whether
-   zero is crossed or but touched: the coefficients would tell rounding. */
+/* Find where a polynomial of degree 4 becomes negative between `low` and `high`, in order; return how many such t have
+   been found so far. The number of sign changes of its Bernstein coefficients there is that of its roots, or larger by
+   two or four: an interval that may have several is halved. If halving does not separate two roots, the value where the
+   polynomial turns back tells whether it crosses zero or only touches it; the coefficients would tell rounding. */
 static int isolate(const double *c, const double *bernstein, double low, double high, int halvings, double *found,
                    int count) {
     double left[5], right[5];
@@ -107,8 +107,8 @@ static int isolate(const double *c, const double *bernstein, double low, double 
     return isolate(c, right, middle, high, halvings - 1, found, count);
 }
 
-/* Find each t, 0 <= t <= until, where a polynomial of degree up to 4 becomes negative, in their order; infinite where
-   there is none. Touching zero without crossing is not a contact. */
+/* Find each t, 0 <= t <= until, at which a polynomial of degree up to 4 becomes negative, in order; infinite if there are
+   no more. Touching zero without crossing it is no contact. */
 static void descents(const double *c, double until, double *found) {
     static const double BERNSTEIN[5][5] = { { 1.0 }, { 1.0, 0.25 }, { 1.0, 0.5, 1.0 / 6.0 },
         { 1.0, 0.75, 0.5, 0.25 }, { 1.0, 1.0, 1.0, 1.0, 1.0 } };
@@ -125,15 +125,15 @@ static double first_descent(const double *c, double until) {
     return found[0];
 }
 
-/* Whether a direction from the centre of a circle is one of its arc. */
+/* Whether a direction from the centre of a circle points to its arc. */
 int spans(const Obstacle *o, double x, double y) {
     if (!(o->extent < TURN)) return 1;
     return modulo(angle_of(y, x) - o->begin + FOOT, TURN) <= o->extent + 2.0 * FOOT;
 }
 
-/* Whether a circle is met from a direction, as far as gates are concerned. A gate that appears in a disk
-   does not act on it until the disk is clear of it; so neither does its end, where the disk comes to it
-   along the gate, which goes on into the disk there. */
+/* Whether gates allow a circle to be met from a direction. A gate that appears inside a disk doesn't act on it until the
+   disk is clear of it. The same holds for its end if the disk reaches it along the gate, which extends into the disk
+   there. */
 int is_reached(int circle, double x, double y, int epoch) {
     if (!O.change_count) return 1;
     if (!is_there(circle, epoch)) return 0;
@@ -149,13 +149,14 @@ static double speed_of(const Motion *m) { return length_of(m->vx, m->vy); }
 static double after_x(const Motion *m, double t) { return m->x + t * (m->vx + 0.5 * t * m->ax); }
 static double after_y(const Motion *m, double t) { return m->y + t * (m->vy + 0.5 * t * m->ay); }
 
-/* The corner in which a point is at a time, of what it is on or leaves; else -1. */
+/* The corner, a sector between two faces, that a point is in at a time, at an end of the obstacle that it is on or
+   leaves; else -1. */
 static int corner_of(const Motion *m, double t) {
     int from = m->on == NONE ? m->left : m->on, side = m->on == NONE ? m->left_side : m->on_side;
     return A.point && from != NONE ? corner_at(from, side, after_x(m, t), after_y(m, t)) : NONE;
 }
 
-/* Whether a point cannot meet something at a time, as it is in a corner then that this does not bound. */
+/* Whether a point cannot meet something at a time, as it is in a corner then that this doesn't bound. */
 static int is_barred(const Motion *m, int k, int side, double t) {
     int corner = corner_of(m, t);
     return corner != NONE && !bounds(corner, k, side, epoch_at(A.age + t));
@@ -189,7 +190,7 @@ static int is_near(const Box *box, const Obstacle *o) {
         && box->high[1] > o->low[1];
 }
 
-/* Whether a particle on the incoming belt cannot meet something at any height. */
+/* Whether a particle on the incoming belt cannot meet something at whatever height it rides. */
 static int is_under_belt(int k) {
     return k == 0 || k == O.pulley || k == O.tips[0].circle || k == O.tips[1].circle;
 }
@@ -225,15 +226,15 @@ static double meet_face(const Motion *m, int k, int side, double until) {
     double over = FOOT * o->length;
     foot += time * (pace + (0.5 * time) * push);
     if (!(foot >= -over && foot <= over + o->length)) return INFINITY;
-    /* Grazing the end on the way out is not lying on the face. */
+    /* A particle that grazes the end while moving outwards does not lie on the face. */
     if (grazing && ((foot <= over && pace < 0.0) || (foot >= o->length - over && pace > 0.0)))
         return INFINITY;
     return O.change_count && !is_there(k, epoch_at(A.age + time)) ? INFINITY : time;
 }
 
-/* Improve the time of a contact by a Newton step on the distance itself. Its rounding does not grow with
-   the flight, as the polynomial's does; but of a contact that is being left the polynomial, divided by
-   t, is better on ways below rho. */
+/* Improve the time of a contact by a Newton step on the distance itself, whose rounding does not grow with the length of
+   the flight, as that of the polynomial does. For a contact that is being left, the polynomial divided by t is better on
+   paths shorter than rho. */
 static double polish(const Motion *m, const Obstacle *o, double t, int apart) {
     if (!isfinite(t)) return t;
     double x = m->x - o->x + t * (m->vx + 0.5 * t * m->ax), vx = m->vx + t * m->ax;
@@ -244,16 +245,16 @@ static double polish(const Motion *m, const Obstacle *o, double t, int apart) {
     return MAX(t - sense * (distance - rho) / rate, 0.0);
 }
 
-/* When a path comes in past the end of an arc along its face, before `until`; else infinite.
+/* When a path comes past the end of an arc along its face, before `until`; else infinite.
 
-   Before that the arc is not beside the particle, and the gap to its circle may have any sign. Where
-   the gap is zero at the instant at which the arc comes to be beside it, there is no crossing from
-   positive to negative: it is a contact if the gap falls from there. */
+   Before that the arc is not beside the particle, and the gap to its circle may have any sign. If the gap is zero at the
+   instant at which the arc comes to be beside it, there is no crossing from positive to negative: it is a contact if the
+   gap falls from there. */
 static double enter(const Motion *m, int k, double until) {
     const Obstacle *o = O.all + k;
     double first = INFINITY, dx = m->x - o->x, dy = m->y - o->y;
     for (int end = 1; end >= 0; end--) {
-        /* The direction from the centre to the end, and that out of the arc there. */
+        /* Unit vectors from the centre to the end, and out of the arc there. */
         const Tip *tip = O.tips + 2 * (O.faces + (k - O.first_arc) % O.arcs) + end;
         double across = tip->left[0], up = tip->left[1], ax = tip->out[0], ay = tip->out[1];
         double ahead = has_edge(m->joint, k, end) ? 0.0 : ax * dx + ay * dy;
@@ -263,7 +264,7 @@ static double enter(const Motion *m, int k, double until) {
         double y = dy + time * (m->vy + 0.5 * time * m->ay), vy = m->vy + time * m->ay;
         if (!(fabs(across * x + up * y - fabs(o->rho)) <= O.touch)) continue;
         if (!is_reached(k, x, y, epoch_at(A.age + time))) continue;
-        /* The gap, which is zero then, over the time since: so its own zero is divided out. */
+        /* The gap divided by the time since then: this removes its zero at that time. */
         double sense = sign_of(o->rho), gap[] = { sense * 2.0 * (x * vx + y * vy),
             sense * (vx * vx + vy * vy + (x * m->ax + y * m->ay)),
             sense * (vx * m->ax + vy * m->ay), sense * 0.25 * (m->ax * m->ax + m->ay * m->ay), 0.0 };
@@ -273,7 +274,7 @@ static double enter(const Motion *m, int k, double until) {
     return first;
 }
 
-/* Whether two circles are in one place: of a point, two faces of an arc, too. */
+/* Whether two circles are at the same place; for a point, also both faces of an arc. */
 static int is_alike(int k, int left) {
     const Obstacle *a = O.all + k, *b = O.all + left;
     double near = ALIKE * O.touch;
@@ -281,13 +282,13 @@ static int is_alike(int k, int left) {
         && fabs(A.point ? fabs(a->rho) - fabs(b->rho) : a->rho - b->rho) <= near;
 }
 
-/* When a circle is met, before or at `until`; else infinite. */
+/* When a circle is met, at or before `until`; else infinite. */
 static double meet_circle(const Motion *m, int k, double until) {
     const Obstacle *o = O.all + k;
     double dx = m->x - o->x, dy = m->y - o->y, rho = fabs(o->rho), sense = sign_of(o->rho);
     double distance = length_of(dx, dy), sum = dx * m->vx + dy * m->vy;
     if (!(rho >= 0.0)) return INFINITY;
-    /* |d + v t + a t^2/2|^2 - rho^2, as a polynomial of t; rho^2 less that from inside. */
+    /* d + v t + a t^2/2|^2 - rho^2 as a polynomial of t; from inside with the opposite sign. */
     double gap[] = { (distance - rho) * (distance + rho), 2.0 * sum,
         m->vx * m->vx + m->vy * m->vy + (dx * m->ax + dy * m->ay), m->vx * m->ax + m->vy * m->ay,
         0.25 * (m->ax * m->ax + m->ay * m->ay) };
@@ -295,7 +296,7 @@ static double meet_circle(const Motion *m, int k, double until) {
     /* Arcs that lie on each other, or on the pulley, are left together. */
     int leaving = m->left == k || (O.arcs && is_alike(k, m->left)) || is_shared(m->joint, k, 0);
     int beside = is_bound(m, k, 0), touching = fabs(distance - rho) <= O.touch || beside;
-    /* The direction from the centre is as uncertain as the places are, over rho. */
+    /* The direction from the centre is uncertain by the rounding of the places over rho. */
     double uncertain = 2.0 * (PARALLEL * rho + O.touch) * speed_of(m);
     if (touching && fabs(gap[1]) <= uncertain && !leaving) gap[1] = 0.0;
     int closing = touching && gap[1] < 0.0;
@@ -307,7 +308,7 @@ static double meet_circle(const Motion *m, int k, double until) {
     }
     for (int n = 0; n < 5; n++) falls |= gap[n] < 0.0, rises |= gap[n] > 0.0;
     double t = INFINITY;
-    /* Else it is past it for good, or never approaching it: no contact to find. */
+    /* Otherwise it has passed the circle for good, or never approaches it. */
     if ((gap[0] >= 0.0 || rises) && falls) {
         double found[MOST_ROOTS];
         descents(gap, until, found);
@@ -321,26 +322,26 @@ static double meet_circle(const Motion *m, int k, double until) {
     return o->extent < TURN ? MIN(t, enter(m, k, until)) : t;
 }
 
-/* Whether a particle cannot meet a circle, from where it is or comes from. */
+/* Whether a particle cannot meet a circle because of what it touches or has just left. */
 static int is_hidden(const Motion *m, int k) {
     int left = m->left;
     if (m->on != NONE && is_beside(k, m->on, m->on_side < 0)) return 1;
     if (left == NONE) return 0;
     const Obstacle *o = O.all + left;
     if (left >= O.faces)
-        /* Left tangentially with the speed not falling, all terms of the gap to a circle grow. */
+        /* It left the circle tangentially and its speed does not fall: all terms of the gap grow. */
         return left == k && m->order >= FROM_CURVE && m->vx * m->ax + m->vy * m->ay >= 0.0
             && !(O.arcs && o->rho < 0.0);
-    /* A face that is left with the pull away from it hides its own two ends, as does one slid on. */
+    /* A face that is left with an acceleration away from it hides its own two ends, like a face that is slid on. */
     return (O.tips[2 * left].circle == k || O.tips[2 * left + 1].circle == k)
         && m->left_side * (m->ax * o->nx + m->ay * o->ny) >= 0.0;
 }
 
-/* Find what a particle meets first, and whether it does so at or before `until` (s from now, finite),
-   which then becomes the time of that. The side is that of a face, 0 for a circle.
+/* Find what a particle meets first, and whether that is at or before `until` (s from now, finite), which then becomes the
+   time of the contact. The side is that of a face, 0 for a circle.
 
-   Finds faces within a segment's length, ends of segments (for a disk), arcs and the pulley. Misses, by
-   design, a point against the end of a segment, and anything the particle overlaps already. */
+   It finds faces within a segment's length, ends of segments (for a disk), arcs and the pulley. By design it misses a
+   point that hits the end of a segment, and anything that the particle overlaps already. */
 int first_contact(const Motion *m, double *until, int *obstacle, int *side) {
     Box box = box_of(m, *until);
     double first = INFINITY, soonest = INFINITY;
@@ -359,19 +360,19 @@ int first_contact(const Motion *m, double *until, int *obstacle, int *side) {
         double time = meet_circle(m, k, *until);
         if (time < soonest) soonest = time, circle = k;
     }
-    /* Before a face that is met then, and at the latest at the end. */
+    /* A circle counts only if it is met before the face, or, without a face, at the latest at `until`. */
     if (circle == NONE || !(soonest < *until || (!hits && soonest == *until))) return hits;
     *until = soonest, *obstacle = circle, *side = 0;
     return 1;
 }
 
-/* Whether a point that rides round a circle cannot meet something at a place: as `is_barred`. */
+/* Whether a point that rides round a circle cannot meet something at a place: see `is_barred`. */
 static int is_across(int circle, int k, int side, double x, double y, int epoch) {
     int corner = A.point ? corner_at(circle, 0, x, y) : NONE;
     return corner != NONE && !bounds(corner, k, side, epoch);
 }
 
-/* Take in one more obstacle of a ride, whose gap falls with phi at the rate `closing` at an angle. */
+/* Update the bounds of a ride by an obstacle whose gap falls with phi at the rate `closing` at an angle. */
 static void narrow(Bound *found, double phi, double angle, double closing, Bound what) {
     for (int way = 0; way < 2; way++) {
         double sign = way ? 1.0 : -1.0;
@@ -382,8 +383,8 @@ static void narrow(Bound *found, double phi, double angle, double closing, Bound
     }
 }
 
-/* Find what stops a ride round a circle backwards and forwards, now at phi, on the half that `side`
-   tells; only of what is there in an epoch. */
+/* Find what stops a ride round a circle backwards and forwards, which is now at phi on the half `side`, among what exists
+   in an epoch. */
 void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
     const Obstacle *c = O.all + circle;
     double facing = sign_of(c->rho), rho = c->rho;
@@ -396,7 +397,7 @@ void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
             /* The gap to a face is rho (cos(phi - tilt) - level). */
             double height = (o->x - c->x) * o->nx + (o->y - c->y) * o->ny;
             double level = (face * height + A.given->radius) / rho;
-            /* A ride that only touches goes on. */
+            /* A ride that only touches it goes on. */
             if (!(fabs(level) < 1.0) || is_beside(circle, k, n) || !is_there(k, epoch)) continue;
             double tilt = angle_of(face * o->nx, face * o->ny), half = angle_of_cosine(level);
             for (int sign = -1; sign <= 1; sign += 2) {

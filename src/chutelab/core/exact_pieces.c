@@ -1,21 +1,22 @@
-/* The machine as the exact engine sees it: faces and circles to meet, and how pieces join.
+/* The machine for the exact engine: faces and circles that can be met, and how pieces join.
 
-   The pieces that share a place, sorted by the angles at which they leave it, divide its surroundings
-   into sectors. A disk is in one of them and can touch only the two faces that bound that. Where the
-   angle between these is pi they are *flush*, and a ride on one goes on on the other; where it is
-   more, round the place; where it is less, the ride is stopped before. */
+   The pieces that end at a place, sorted by the angles at which they leave it, divide its surroundings into sectors. A
+   disk is in one of them and can touch only the two faces that bound it. If the angle between these is pi, they are
+   *flush*, and a ride on one continues on the other; if it is larger, it continues round the place; if it is smaller, the
+   ride is stopped before. */
 
 #include <stdlib.h>
 #include "exact.h"
 
-/* Share of a curvature by which two pieces that leave a place in one direction differ at least. */
+/* Share of a curvature; two pieces that leave a place in the same direction lie on each other if their curvatures differ
+   by less. */
 #define CIRCULAR 1e-9
-/* Width, in `touch`, by which the boxes of faces are larger than they need be. */
+/* Margin of the boxes of faces, in `touch`. */
 #define BOX_TOUCHES 64.0
-/* rad; of a hollow bend this slight it may be, by rounding, that a piece ends before the next is met: it goes
-   on as the next. */
+/* rad; at a concave bend this slight a piece may, by rounding, end before the next one is met: it continues as the next
+   one. */
 #define SLIGHT 1e-7
-/* In place of an end: a piece that goes on through a place, first along it, then back. */
+/* Replaces the number of an end for a piece that passes through a place: first along it, then back. */
 #define THROUGH 2
 
 Obstacles O;
@@ -23,13 +24,13 @@ Obstacles O;
 /* A segment, or a part of one, with its ends. */
 typedef struct { double x, y, ex, ey, length; const Segment *of; int source; } Part;
 
-/* A piece seen from a place where it ends, or which it passes; `number` counts those of the place. */
+/* A piece as seen from a place where it ends, or which it passes; `number` counts those of the place. */
 typedef struct { double angle, bend; int piece, end, number; } Ray;
 
 static double *arena, *arena_end;
 static int arena_full;
 
-/* Set doubles apart; where there is no room for them, ask for more. */
+/* Reserve room in the arena; if there is too little, note that more is needed. */
 static void *reserve(double count, int size) {
     double *found = arena, doubles = ceil(count * size / 8.0);
     if (doubles > arena_end - arena) {
@@ -46,7 +47,7 @@ static int points;        /* whether particles are mass points */
 static const Arc **bends; /* those with ends first */
 static int *bend_source;
 static double *xs;        /* of the ends, for sorting */
-static int *order;        /* ends by x */
+static int *order;        /* ends sorted by x */
 static int *at_spot;      /* first end at each spot, or -1 ... */
 static int *next_there;   /* ... and the next of each */
 static Ray *rays, *ring, *flat;
@@ -73,7 +74,7 @@ static int by_angle(const void *one, const void *other) {
     return by ? by : a->number - b->number;
 }
 
-/* Where ends are, and the directions out of their pieces and to the left of these. */
+/* Set the places of ends, and the unit vectors out of their pieces and to the left of these. */
 static void find_tips(void) {
     for (int s = 0; s < part_count; s++) {
         const Part *p = parts + s;
@@ -107,7 +108,7 @@ static void sort_tips(void) {
     qsort(order, O.tip_count, sizeof *order, by_x);
 }
 
-/* Number of ends whose x is below some value. */
+/* Number of ends whose x is below a value. */
 static int before(double x) {
     int low = 0, high = O.tip_count;
     while (low < high) {
@@ -133,8 +134,8 @@ static double size_for(const Lone *p) {
     return MAX(O.size, MAX(fabs(p->position[0]), fabs(p->position[1])));
 }
 
-/* Where along a part an end lies inside it, m, and is tangent to it, which is no matter to a point; else 0.
-   What the incoming belt carries comes to nothing that begins on it. */
+/* Where an end lies inside a part and its piece is tangent to the part, m along the part; else 0. For a mass point it
+   need not be tangent. Particles on the incoming belt do not meet anything that begins on the belt. */
 static double begins_on(const Part *p, int s, int n, double near) {
     const Tip *tip = O.tips + n;
     const double *t = p->of->tangent;
@@ -146,7 +147,7 @@ static double begins_on(const Part *p, int s, int n, double near) {
         ? foot : 0.0;
 }
 
-/* List where other pieces begin on a part, if `feet` is given; return how many do. */
+/* List where other pieces begin on a part, if `feet` is given; return the number. */
 static int begin_on(int s, double near, double *feet) {
     const Part *p = parts + s;
     int count = 0;
@@ -159,19 +160,20 @@ static int begin_on(int s, double near, double *feet) {
     return count;
 }
 
-/* Half the length of a chord so far off the centre of a circle, m; 0 where it but touches it, else NAN. */
+/* Half the length of a chord at a distance `off` from the centre of a circle, m; 0 if it only touches the circle, NAN if
+   it misses it. */
 static double half_chord(double radius, double off, double near) {
     double depth = radius - fabs(off);
     return fabs(depth) <= near ? 0.0 : depth < 0.0 ? NAN : sqrt(depth * (radius + fabs(off)));
 }
 
-/* List where a part crosses another one within both, and arcs; return how many places there are. */
+/* List where a part crosses other parts, within both, and arcs; return the number. */
 static int cross_at(int s, double near, double *feet) {
     const Part *p = parts + s;
     const double *t = p->of->tangent;
     int count = 0;
     for (int k = 0; k < part_count; k++) {
-        /* The place is found on one of the two, for both. */
+        /* The place is computed from the same one of the two for both. */
         const Part *a = parts + MIN(s, k), *b = parts + MAX(s, k);
         const double *u = a->of->tangent, *v = b->of->tangent;
         double dx = b->x - a->x, dy = b->y - a->y, sine = u[0] * v[1] - u[1] * v[0];
@@ -200,7 +202,7 @@ static int cross_at(int s, double near, double *feet) {
     return count;
 }
 
-/* List where a part is to be cut, if `feet` is given; return how many places there are. */
+/* List where a part is to be cut, if `feet` is given; return the number. */
 static int cuts_of(int s, double near, double *feet) {
     int count = begin_on(s, near, feet);
     return points && !(E.wheel_count && s == 0) ? count + cross_at(s, near, feet ? feet + count : 0) : count;
@@ -215,8 +217,8 @@ static Part part_of(const Part *whole, double low, double high) {
     return p;
 }
 
-/* Cut parts where other pieces begin on them: there three join. For a point also where they cross: it has no
-   size that tells on which side it is. Returns whether some were. */
+/* Cut parts where other pieces begin on them: three pieces join there. For a mass point also where they cross, as it has
+   no size that tells on which side it is. Return whether any were cut. */
 static int cut_parts(double near) {
     int found = 0, count = 0;
     for (int s = 0; s < part_count; s++) found += cuts_of(s, near, 0);
@@ -239,7 +241,7 @@ static int cut_parts(double near) {
     return 1;
 }
 
-/* Note where an arc is to be cut, rad from its first angle, if a place on its circle lies within it. */
+/* Note where an arc is to be cut, rad from its first angle, if a place on its circle lies within the arc. */
 static int note_turn(int b, double x, double y, double near, double *turns, int count) {
     double extent = extent_of(bends[b]), edge = near / bends[b]->radius, turn = turn_of(bends[b], x, y);
     if (extent < TURN && !(turn > edge && turn < extent - edge)) return count;
@@ -247,8 +249,8 @@ static int note_turn(int b, double x, double y, double near, double *turns, int 
     return count + 1;
 }
 
-/* List where an arc is to be cut for a point, if `turns` is given: where pieces end on it, and where it
-   crosses arcs; return how many places there are. */
+/* List where an arc is to be cut for a mass point, if `turns` is given: where pieces end on it, and where it crosses
+   arcs. Return the number. */
 static int cuts_of_bend(int b, double near, double *turns) {
     const Arc *a = bends[b];
     int count = 0;
@@ -258,7 +260,7 @@ static int cuts_of_bend(int b, double near, double *turns) {
             count = note_turn(b, x, y, near, turns, count);
     }
     for (int k = 0; k < O.arcs; k++) {
-        /* The places are found on one of the two, for both. */
+        /* The places are computed from the same one of the two for both. */
         const Arc *one = bends[MIN(b, k)], *two = bends[MAX(b, k)];
         double dx = two->center[0] - one->center[0], dy = two->center[1] - one->center[1];
         double apart = length_of(dx, dy), sum = one->radius + two->radius;
@@ -274,8 +276,8 @@ static int cuts_of_bend(int b, double near, double *turns) {
     return count;
 }
 
-/* Cut arcs where a point would have to be told on which side of what else is there it is. A whole circle is
-   cut opposite, too, as a part of it has two ends. Returns whether some were. */
+/* Cut arcs where it would have to be known on which side of another piece a mass point is. A full circle is also cut on
+   the opposite side, as a part of it has two ends. Return whether any were cut. */
 static int cut_bends(double near) {
     int found = 0, count = 0;
     for (int b = 0; b < O.arcs; b++) found += cuts_of_bend(b, near, 0);
@@ -324,7 +326,7 @@ static int list_tips(void) {
     return 1;
 }
 
-/* Number the places where pieces begin and end; within the tolerance it is one place. */
+/* Number the places where pieces begin and end; ends within the tolerance share a place. */
 static void number_spots(double tolerance) {
     for (int n = 0, first = 0; n < O.tip_count; n++) {
         Tip *tip = O.tips + order[n];
@@ -346,8 +348,8 @@ static double went_of(int piece) {
 }
 static int stays(int piece) { return isinf(came_of(piece)) && isinf(went_of(piece)); }
 
-/* Of parts that lie on each other keep the first, as it counts when two are met at once. A gate that
-   shuts again is there twice, at different times. */
+/* Of parts that lie on each other keep the first, which also counts first if two are met at once. A gate that closes
+   again is there twice, at different times. */
 static void drop_doubles(void) {
     int kept = 0;
     for (int s = 0; s < part_count; s++) {
@@ -370,7 +372,7 @@ static void drop_doubles(void) {
     part_count = kept;
 }
 
-/* List when gates open or shut, each time once. */
+/* List when gates appear or vanish, each time once. */
 static int list_changes(void) {
     int pieces = part_count + O.arcs, count = 0;
     O.changes = reserve(2 * pieces, sizeof *O.changes);
@@ -386,8 +388,8 @@ static int list_changes(void) {
     return 1;
 }
 
-/* Find which ends lie on an arc, but not where that ends: they cannot be met, nor can that of the belt
-   on the pulley. */
+/* Find which ends lie on an arc, other than at its ends: they cannot be met, and neither can the end of the belt on the
+   pulley. */
 static void find_rests(double near) {
     sort_tips();
     for (int b = 0; b < O.arcs; b++) {
@@ -422,8 +424,8 @@ static void place_of_piece(Obstacle *o, int piece) {
     o->came = came_of(piece), o->went = went_of(piece);
 }
 
-/* Make a circle round each place where pieces of disks end, and list the ends at it; a point meets it
-   with probability zero. What stays comes first. */
+/* For disks, make a circle round each place where pieces end, and list the ends at it. (A mass point meets it with
+   probability zero.) Pieces that always exist come first. */
 static int make_ends(int disks) {
     int count = 0;
     for (int n = O.tip_count - 1; n >= 0; n--) {
@@ -439,7 +441,7 @@ static int make_ends(int disks) {
             for (int k = at_spot[O.tips[n].spot]; k != NONE; k = next_there[k])
                 if (O.tips[k].rests == NONE)
                     O.tips[k].circle = O.faces + count, O.tips[k].next = o->tips, o->tips = k;
-            /* The ends come the other way round: the turning of the first one counts. */
+            /* The list is in reverse order: the last one that sets it is the first end. */
             for (int k = o->tips; k != NONE; k = O.tips[k].next)
                 o->turning = k / 2 < O.faces ? 0.0 : turning_of(k / 2);
             count++;
@@ -494,7 +496,7 @@ int face_of(int piece, int face) {
 
 static double angle_at(double x, double y) { return modulo(angle_of(y, x), TURN); }
 
-/* List the pieces at a place as they go out of it. */
+/* List the pieces at a place as rays that leave it. */
 static int list_rays(int first) {
     int count = 0;
     for (int n = first; n != NONE; n = next_there[n]) {
@@ -508,7 +510,7 @@ static int list_rays(int first) {
         int through = O.faces + tip->rests, known = tip->rests == NONE;
         for (int k = 0; k < count; k++) known |= rays[k].piece == through;
         if (known) continue;
-        /* By rounding the place is not quite on top of the pulley, but the belt is flush. */
+        /* By rounding the place isn't exactly at the top of the pulley, but the belt is flush. */
         int wheel = tip->rests == O.arcs;
         const Arc *a = wheel ? 0 : bends[tip->rests];
         double x = wheel ? tip->left[0] : tip->x - a->center[0];
@@ -522,11 +524,11 @@ static int list_rays(int first) {
     return count;
 }
 
-/* Face of the piece on the left of the way out; the right one has the other sign. */
+/* The face of a piece that is on the left as it leaves the place; the right one has the other sign. */
 static int left_of(const Ray *r) { return r->end == 0 || r->end == THROUGH ? 1 : -1; }
 static int tip_of(const Ray *r) { return 2 * r->piece + r->end; }
 
-/* Sort rays of one angle counterclockwise; of those that lie on each other keep the first. */
+/* Sort rays of the same angle counterclockwise by curvature; of those that lie on each other keep the first. */
 static int sort_by_bend(Ray *some, int count) {
     int kept = 0;
     for (int n = 0; n < count; n++) {
@@ -544,8 +546,8 @@ static int sort_by_bend(Ray *some, int count) {
     return kept;
 }
 
-/* Sort the rays of a place that are there in an epoch, all in epoch -1, into `flat`; return how many.
-   `turns` becomes 1 if all go one way. What lies on another piece is left out. */
+/* Sort the rays of a place that exist in an epoch (all of them in epoch -1) into `flat`; return the number. `turns`
+   becomes 1 if all have the same angle. Of those that lie on each other only the first is kept. */
 static int sort_rays(int count, int epoch, int *turns) {
     int some = 0, kept = 0, last = 0;
     for (int n = 0; n < count; n++)
@@ -555,7 +557,7 @@ static int sort_rays(int count, int epoch, int *turns) {
         if (!(ring[n].angle - ring[last].angle <= COLLINEAR)) last = n;
     *turns = last == 0;
     if (last && ring[0].angle + TURN - ring[last].angle <= COLLINEAR) {
-        /* What is just below a whole turn goes the way of what is just above 0. */
+        /* An angle just below a full turn is the same as one just above 0. */
         int first = 1;
         while (first < last && ring[first].angle - ring[0].angle <= COLLINEAR) first++;
         *turns = first == last;
@@ -585,8 +587,8 @@ static void go_onward(Onward *to, const Ray *r, int face, const Ray *other, int 
         to[2 * tip_of(r) + (face < 0)] = (Onward){ face_of(other->piece, onto), onto, meets };
 }
 
-/* Find what bounds a sector with a face at its end, and what the face goes over into there: that if it is
-   flush, else the circle round the end, whose side is left open, 0. */
+/* Find what bounds a sector together with a face at its end, and on what a slide along the face continues there: on that
+   if it is flush, else on the circle round the end, with side 0, as it is open. */
 static void find_onward(int epoch) {
     Onward *to = O.onward + epoch * 2 * O.tip_count, *opposite = O.opposite + epoch * 2 * O.tip_count;
     for (int n = 0; n < 2 * O.tip_count; n++) {
@@ -609,9 +611,9 @@ static void find_onward(int epoch) {
     }
 }
 
-/* Find the middles of the halves of ends that join left faces: at an end the piece's left normal. At a
-   joint the rim between two pieces is all on one side of both, as wide as it may be, and its middle
-   bisects the angle between them: along the sum of both normals, and of both ways out. */
+/* Set the crowns: unit vectors to the middle of that half of an end that belongs to the left face. At a free end it is
+   the piece's left normal. At a joint the rim between two pieces belongs to one face of both, however wide it is, and its
+   middle bisects the angle between them: it has the direction of the sum of both normals and both ways out. */
 static void find_crowns(void) {
     for (int n = 0; n < O.tip_count; n++) {
         if (at_spot[O.tips[n].spot] != n) continue;
@@ -645,8 +647,8 @@ static void join(int set, int obstacle, int faces, int edge) {
     O.sets[set] = o->members = O.member_count++;
 }
 
-/* Find what a disk touches at once where faces end: faces that share a place and the normal there, and
-   the circle round it. */
+/* Find the sets of what a disk touches at once where faces end: faces that share a place and the normal there, and the
+   circle round it. */
 static void find_sets(void) {
     double(*normals)[2] = (double(*)[2])flat;
     for (int n = 0; n < O.tip_count; n++) {
@@ -685,7 +687,7 @@ static void hand_over(int obstacle, int tip, int face, int onto) {
     o->handovers = O.handover_count++;
 }
 
-/* Find where rides round circles go over into other pieces; the last one found stands first. */
+/* Find where rides round circles continue on other pieces; the last one found comes first. */
 static void find_handovers(void) {
     for (int n = O.tip_count - 1; n >= 0; n--)
         for (int k = 0; k < 2; k++) {
@@ -713,7 +715,7 @@ static int find_joints(void) {
     return 1;
 }
 
-/* Lay the obstacles of a member of a family, or of the one machine; 0 if there is no room for them. */
+/* Build the obstacles of a member of a family, or of a single machine; return 0 if there is no room for them. */
 int lay_obstacles(int member) {
     const Segment *segments = E.segments + member * E.segment_count;
     const Arc *arcs = E.arcs + member * E.arc_count;
@@ -759,7 +761,7 @@ int lay_obstacles(int member) {
     return find_joints();
 }
 
-/* Make the obstacles those of the particle under way, by its radius, and by where it is released. */
+/* Fit the obstacles to the radius and the release of the present particle. */
 void fit_obstacles(void) {
     double r = A.given->radius, touch = ULP * (TOUCH_ULPS * size_for(A.given) + E.far);
     O.touch = touch;
@@ -772,14 +774,14 @@ void fit_obstacles(void) {
             o->rho = room > touch ? -room : NAN;
         } else
             o->rho = o->bend + r;
-        /* A circle's box is smaller, met from outside: what only touches it does not meet it. */
+        /* The box of a circle that is met from outside is smaller than the circle: touching it is no contact. */
         if (o->met != FACE) reach = isnan(o->rho) ? -INFINITY : fabs(o->rho - touch);
         o->low[0] = MIN(o->x, x) - reach, o->low[1] = MIN(o->y, y) - reach;
         o->high[0] = MAX(o->x, x) + reach, o->high[1] = MAX(o->y, y) + reach;
     }
 }
 
-/* How many of the changes have been by an age of the particle. */
+/* Number of changes of gates up to an age of the particle. */
 int epoch_at(double t) {
     int count = 0;
     while (count < O.change_count && O.changes[count] - A.given->release <= t) count++;
@@ -790,7 +792,7 @@ static int is_open(const Obstacle *o, int piece, double since) {
     return piece < 0 ? o->came <= since && o->went > since : came_of(piece) <= since && went_of(piece) > since;
 }
 
-/* Whether an obstacle is there; an end that pieces share is while any of them is. */
+/* Whether an obstacle exists in an epoch; an end shared by pieces does while any of them does. */
 int is_there(int obstacle, int epoch) {
     if (!O.change_count) return 1;
     const Obstacle *o = O.all + obstacle;
@@ -812,7 +814,7 @@ int is_shared(int set, int obstacle, int face) {
     return m && (m->faces & (1 << face)) != 0;
 }
 
-/* Whether an end (0, 1) of an arc is where the faces of a set end. */
+/* Whether an end (0, 1) of an arc is at the place of a set. */
 int has_edge(int set, int obstacle, int edge) {
     const Member *m = member_of(set, obstacle);
     return m && (m->edges & (1 << edge)) != 0;
@@ -824,8 +826,8 @@ static int back_of(int circle) {
     return circle < O.first_arc + O.arcs ? circle + O.arcs : circle - O.arcs;
 }
 
-/* Whether something touches a circle without being met, as both share a place: they are tangent to each
-   other there, and have no other point in common. To a point both faces of a piece are in one place. */
+/* Whether something touches a circle without being met, since both are in one set: they are tangent there, and have no
+   other point in common. For a mass point both faces of a piece are at the same place. */
 int is_beside(int circle, int obstacle, int face) {
     int point = O.arcs && A.given->radius <= O.touch;
     for (int k = 0; k < 1 + point; k++) {
@@ -842,8 +844,8 @@ int is_beside(int circle, int obstacle, int face) {
     return 0;
 }
 
-/* The corner in which a point is that touches a face, or a circle, at a place: the number of the sector beside
-   it at its end there, 2 tip + face; else -1. */
+/* The corner that a mass point is in when it touches a face, or a circle, at a place: the number 2 tip + face of the
+   sector beside the end there; else -1. */
 int corner_at(int obstacle, int side, double x, double y) {
     int piece = obstacle, inside = side < 0;
     if (obstacle >= O.faces) {

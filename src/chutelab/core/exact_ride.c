@@ -1,52 +1,51 @@
-/* A ride round a pulley, an arc or a surface's end, in closed steps.
+/* A ride round a pulley, an arc or the end of a surface, by Taylor series.
 
-   The centre of the particle moves on a circle of radius rho. The angle phi is that of the normal,
-   which points at the particle, from the top, clockwise; inside a circle rho is negative. With w the
-   speed along (n_y, -n_x), z = r omega, N the normal and F the tangential force per mass,
+   The centre of the particle moves on a circle of radius rho. The angle phi is that of the normal, which points at the
+   particle, from the top, clockwise; inside a circle rho is negative. With w the speed along (n_y, -n_x), z = r omega, N
+   the normal and F the tangential force per mass,
 
        phi' = w/rho,   w' = g sin phi + F,   z' = (m r2/I) F,   N = g cos phi - w2/rho,
 
-   and F = stick g sin phi + load N: gripping without turning is stick = -1, rolling -I/(I + m r2), -1/3
-   of a disk; slipping is load = -sigma mu, with sigma the sign of the slip u = w + z - belt. Rolling
-   friction adds a couple q m r, at most kappa N, that opposes the spin against the surface's own,
-   z' = (m r2/I) (F + q), and holds it where it can. Everything is expanded in a Taylor series in time,
-   which holds for any mixture of turning back, spinning and slipping. A step is as long as its last
-   terms are rounding; knots within it come from the series. */
+   and F = stick g sin phi + load N. A grip without rotation has stick = -1, rolling -I/(I + m r2), -1/3 for a disk; slip
+   has load = -sigma mu, with sigma the sign of the slip u = w + z - belt. Rolling friction adds a moment q m r, at most
+   kappa N, against the spin relative to the surface, z' = (m r2/I) (F + q), and stops the spin if it can. Everything is
+   expanded in a Taylor series in time, which holds for any combination of turning back, spinning and slipping. A step is
+   so short that its last terms are as small as rounding; knots within it are computed from the series. */
 
 #include "exact.h"
 
 #define ORDER 20
-/* Share of the angle (rad), of the speeds and of the load that the last terms of a step may be. */
+/* Bound on the last terms of a step, as a share of the speeds and of the load, and rad of the angle. */
 #define LEFT_OUT 1e-16
-/* Share of its first term that a series keeps at least where rounding makes it not negative. */
+/* Share of its first term by which a series must stay above 0, so that rounding can't make it negative. */
 #define SURELY 1e-9
-/* Newton steps towards the time of an event, the share of it by which what they find may be off, and bisections of
-   what is left of a step, past the last bit. */
+/* Newton steps towards the time of an event, the share of that time by which their result may be wrong, and bisections of
+   the remaining interval, beyond the last bit. */
 #define STEPS 8
 #define NEAR (8.0 * ULP)
 #define HALVINGS 64
 
-/* One term more than is used: that of the order after. */
+/* One term more than is used: the recursion also gives that of the next order. */
 typedef double Series[ORDER + 2];
-/* Two numbers at once: each rounds as by itself. */
+/* Two numbers at once; each is rounded as if alone. */
 typedef double Two __attribute__((vector_size(16)));
 
 static Series phi, w, z, work, heat, twist, normal, force, couple;
 
-/* Series that turn negative at events that can happen, and what they tell. */
+/* Gauges: series that become negative at the events that can happen, and the outcomes that they tell. */
 #define GAUGES 9
 static Series gauges[GAUGES];
 static int tells[GAUGES], gauge_count;
 
-/* A series at a time, its even and its odd terms at once. */
+/* The value of a series at a time; even and odd terms are summed at once. */
 static double at_time(const double *c, double t) {
     Two sum = { c[ORDER], 0.0 };
     for (int n = ORDER - 2; n >= 0; n -= 2) sum = sum * (t * t) + (Two){ c[n], c[n + 1] };
     return sum[0] + t * sum[1];
 }
 
-/* Whether a series stays at 0 or above up to a time, whose powers are given, as the sum of what its terms can take
-   off is less than the first one. */
+/* Whether a series stays at or above 0 up to a time, given by its powers: all other terms together are less than the
+   first one. */
 static int is_never_negative(const double *c, const double *powers) {
     double most = 0.0;
     for (int n = 1; n <= ORDER; n++) most += fabs(c[n]) * powers[n];
@@ -55,9 +54,8 @@ static int is_never_negative(const double *c, const double *powers) {
 
 static int is_held(const Circle *c) { return c->rolling > 0.0 && c->roll == 0.0; }
 
-/* The Taylor coefficients in time; those of the work are of F, of the heat of -F u and that of the
-   couple, of the twist of q. Two products of series are taken at once: w w with F u, and phi' times the cosine
-   with phi' times the sine. */
+/* Set the Taylor coefficients in time: the work is the integral of F, the heat that of -F u less that of the moment, the
+   twist that of q. Two products of series are computed at once: w w with F u, and phi' cos phi with phi' sin phi. */
 static void expand(const Circle *c) {
     Series slip, spin, rate;
     Two turns[ORDER + 2], forced[ORDER + 1], moved[ORDER + 1];
@@ -78,7 +76,7 @@ static void expand(const Circle *c) {
         rate[n] = w[n] * bend;
         phi[n + 1] = rate[n] * part;
         moved[n] = (Two){ w[n], slip[n] };
-        /* What is known since the last term comes last: the rest is summed meanwhile. */
+        /* The factor that was computed last is added last, so that the other terms don't wait for it. */
         for (int i = 1; i < n; i++) products += forced[i] * moved[n - i], turning += rate[i] * turns[n - i];
         if (n) products += forced[0] * moved[n], turning += rate[0] * turns[n];
         turning += rate[n] * turns[0];
@@ -99,7 +97,7 @@ static void expand(const Circle *c) {
     }
 }
 
-/* Add a gauge: a number and two series, each times a factor. */
+/* Add a gauge: a number and two series, each with a factor. */
 static void add_gauge(int outcome, double first, double a, const double *x, double b, const double *y) {
     double *gauge = gauges[gauge_count];
     tells[gauge_count++] = outcome;
@@ -107,26 +105,26 @@ static void add_gauge(int outcome, double first, double a, const double *x, doub
     gauge[0] += first;
 }
 
-/* Find the series that turn negative at events that can happen. */
+/* Set the gauges of the events that can happen. */
 static void find_gauges(const Circle *c) {
     gauge_count = 0;
     add_gauge(LIFT, 0.0, 1.0, normal, 0.0, normal);
     for (int side = -1; side <= 1 && c->slip == 0.0 && isfinite(c->friction); side += 2)
         add_gauge(ONSET, 0.0, c->friction, normal, side, force);
     if (c->slip != 0.0) add_gauge(GRIP, -c->slip * c->belt, c->slip, w, c->slip, z);
-    /* Round a circle that does not end it may go however often. */
+    /* A ride round a full circle has no ends. */
     if (isfinite(c->low)) add_gauge(LOW, -c->low, 1.0, phi, 0.0, phi);
     if (isfinite(c->high)) add_gauge(HIGH, c->high, -1.0, phi, 0.0, phi);
     if (c->roll != 0.0) add_gauge(HALT, -c->roll * c->turn, c->roll, z, 0.0, z);
-    /* What slips with less friction than that stays held. */
+    /* With slip the spin stays held if friction is less than rolling friction can hold. */
     for (int side = -1; side <= 1 && is_held(c) && c->slip == 0.0; side += 2)
         add_gauge(ROLL, 0.0, c->rolling, normal, side, couple);
 }
 
-/* How long a step is, s, and by how many knots, evenly in time, it is recorded.
+/* The length of a step, s, and the number of knots, evenly in time, by which it is recorded.
 
-   The cubic between two knots, h apart, is off by h^4/384 times the fourth derivative of the place
-   rho exp(i phi): rho |phi1^4 - 3 phi2^2 - 4 phi1 phi3 + i (phi4 - 6 phi1^2 phi2)|. */
+   The cubic between two knots, h apart, is off by h^4/384 times the fourth derivative of the place rho exp(i phi): rho
+   |phi1^4 - 3 phi2^2 - 4 phi1 phi3 + i (phi4 - 6 phi1^2 phi2)|. */
 static double step_of(const Circle *c, double longest, int *parts) {
     double pace = fabs(c->w) + fabs(c->z) + fabs(c->belt) + sqrt(c->gravity * fabs(c->rho));
     double load = c->gravity + c->w * c->w / fabs(c->rho), dt = longest, bend = 0.0;
@@ -136,11 +134,11 @@ static double step_of(const Circle *c, double longest, int *parts) {
         if (load > 0.0) share = MAX(share, fabs(normal[n]) / load);
         dt = MIN(dt, pow(LEFT_OUT / share, 1.0 / n));
     }
-    /* What rests does so for ever. */
+    /* A particle at rest has no bound on its step. */
     double finite = isfinite(dt) ? dt : 0.0, rates[4][ORDER];
     for (int k = 0; k < 4; k++)
         for (int n = 1; n <= ORDER - k; n++) rates[k][n - 1] = (k ? rates[k - 1][n] : phi[n]) * n;
-    /* In the middle of the step and at its end at once. */
+    /* In the middle of the step and at its end, at once. */
     Two later[4], t = { 0.5 * finite, finite };
     for (int k = 0; k < 4; k++) {
         later[k] = (Two){ 0.0, 0.0 };
@@ -158,8 +156,8 @@ static double step_of(const Circle *c, double longest, int *parts) {
     return dt * MIN(MOST_KNOTS / count, 1.0);
 }
 
-/* When a series that is not negative at `low` and is at `high` becomes so. Newton's method tells about where: if it
-   does so there, little is left to be halved. */
+/* The time at which a series that is not negative at `low` and is at `high` becomes negative. Newton's method finds about
+   where; if the sign changes there, little is left for bisection. */
 static double first_negative(const double *c, double low, double high) {
     double t = 0.5 * (low + high);
     for (int n = 0; n < STEPS && t > low && t < high; n++) {
@@ -184,7 +182,7 @@ static double first_negative(const double *c, double low, double high) {
     return high;
 }
 
-/* The state at a time: two series at once, each by Horner's rule. */
+/* The state at a time; two series at once, each by Horner's rule. */
 static Ridden state_at(double t) {
     Two place = { phi[ORDER], w[ORDER] }, spent = { work[ORDER], heat[ORDER] }, turned = { z[ORDER], twist[ORDER] };
     for (int n = ORDER - 1; n >= 0; n--) {
@@ -195,14 +193,13 @@ static Ridden state_at(double t) {
     return (Ridden){ t, place[0], place[1], turned[0], spent[0], spent[1], turned[1], NOTHING };
 }
 
-/* Move on by one step, or to the first event within it; return how many knots there are before its
-   end. N must be positive. */
+/* Move on by one step, or to the first event within it; return the number of knots before its end. N must be positive. */
 int advance_ride(const Circle *c, double longest, Ridden *end, Ridden *knots) {
     int parts, outcome = NOTHING, count = 0;
     expand(c);
     find_gauges(c);
     double dt = step_of(c, longest, &parts);
-    /* Where it turns beyond an end of the circle, it would be back at the end of the whole step. */
+    /* If it turns round beyond an end of the circle, it would be back at the end of the whole step. */
     Series back;
     for (int n = 0; n <= ORDER; n++) back[n] = sign_of(c->w) * w[n];
     if (at_time(back, dt) < 0.0) {

@@ -41,7 +41,7 @@ static void tell_passage(const Contact *c, int kind) {
     const double *last = track->held, *past = track->past;
     double way[2], t = d->t - since_passage(c, way), on = t - last[0];
     double then[5] = {d->x, d->y, d->ux, d->uy, d->uspin};
-    /* Where a stop of a hinge ends a step as it begins, they are one. */
+    /* If a stop of a hinge ended a step of length 0, both are the same state. */
     for (int n = 0; n < 3 && track->lasted > 1 && last[0] > past[0]; n++) {
         then[2 + n] = last[3 + n] + on / (last[0] - past[0]) * (last[3 + n] - past[3 + n]);
         if (n < 2) then[n] = last[1 + n] + 0.5 * on * (last[3 + n] + then[2 + n]);
@@ -169,8 +169,8 @@ static void tell_separation(int i) {
     write_event(SEPARATION, i, -1, track->ground, t, &then.x, &then.vx, &then.vx, 0, 0);
 }
 
-/* Restart the rest of a disk if the disk moves: something moves at its contacts, or it has none, and it is further from
-   where its rest began than the greatest speed that counts as rest would take it. */
+/* Restart the rest of a disk if something moves at its contacts, or it has none, and if it is also further from where its
+   rest began than the greatest speed that counts as rest would take it. */
 static void settle_down(Disk *d, double h) {
     double most = REST * sqrt(W.g * d->radius) * CALM_DOWN / W.pace;
     double x = d->x - d->anchor[0], y = d->y - d->anchor[1], turn = d->anchor[2];
@@ -183,9 +183,10 @@ static void settle_down(Disk *d, double h) {
     d->anchor[2] = 0;
 }
 
-/* Set the approach at which disks in contact with a rider or a surface that moves, directly or through others, may stay
-   unresolved. The solver moves neither, so between two of them, or one and a wall, there may be no room, and impacts would
-   go on without end. Impacts may leave open as much as the solve of all of these contacts does: see `left_over`. */
+/* Set the approach at which disks in contact with a rider or a moving surface, directly or through others, may stay
+   unresolved. The solver moves neither of these, so between two of them, or one and a wall, there may be no room, and
+   impacts would go on without end. Impacts may leave open as much as the solve of all of these contacts does: see
+   `left_over`. */
 void give_in(const Contact *list, int count) {
     double open = 0, u[3], v[3];
     int led = 0;

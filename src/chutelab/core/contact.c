@@ -7,8 +7,8 @@
 #define CHORD 1.01
 /* Sine of half the greatest angle by which a step may turn a disk inside an arc. */
 #define STEEPEST 0.9
-/* rad; a particle that hits the inside of an arc at a smaller angle stays on it, however short steps are: otherwise its
-   bounces, which have no end, would all be resolved. */
+/* rad; greatest angle of a rebound from the inside of an arc that may count as rest, however long steps are. Smaller
+   rebounds would follow each other without end. */
 #define FLAT 0.01
 
 /* Whether a disk touches two surfaces at the same place: where one lies on the other, or at an end that both share. */

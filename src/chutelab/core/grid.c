@@ -61,7 +61,7 @@ static void enter(int i, Span s) {
 }
 
 /* Whether two disks can collide: their kinds may pass through each other, and joined ones may be exempt. */
-static int meet(int i, int j) {
+static int can_collide(int i, int j) {
     if (!W.passes) return 1;
     return pair_of(W.disks[i].kind, W.disks[j].kind)->restitution >= 0 && !are_joined(i, j);
 }
@@ -132,7 +132,7 @@ int list_near(double end) {
         Span span = span_of(&d->left);
         int n = query(i, &d->left, span);
         for (int k = 0; k < n; k++) {
-            if (!meet(i, W.found[k])) continue;
+            if (!can_collide(i, W.found[k])) continue;
             if (W.near_count >= W.near_room) return 0;
             add_near(W.near_count++, W.found[k], i);
         }
@@ -148,7 +148,7 @@ void list_again(int i) {
     for (int k = 0; k < n; k++) {
         int j = W.found[k], link = d->nears;
         while (link >= 0 && W.near[link ^ 1] != j) link = W.near_links[link];
-        if (link >= 0 || !meet(i, j)) continue;
+        if (link >= 0 || !can_collide(i, j)) continue;
         if (W.near_count + W.later_count >= W.near_room) {
             W.later_count = -1;
             return;
@@ -177,7 +177,7 @@ int enter_again(int i, double end) {
 int reachable(int i) {
     int n = W.interact ? query(i, &W.disks[i].left, span_of(&W.disks[i].left)) : 0, kept = 0;
     for (int k = 0; k < n; k++)
-        if (meet(i, W.found[k])) W.found[kept++] = W.found[k];
+        if (can_collide(i, W.found[k])) W.found[kept++] = W.found[k];
     return kept;
 }
 
@@ -220,12 +220,13 @@ int place_is_free(int i, double x, double y, double t) {
     int n = query(i, box, span_of(box));
     for (int k = 0; k < n; k++) {
         if (is_cornered(i, W.found[k])) {
-            if (meet(i, W.found[k]) && would_overlap(i, x, y, W.found[k], t, TOUCHING * r)) return 0;
+            if (can_collide(i, W.found[k]) && would_overlap(i, x, y, W.found[k], t, TOUCHING * r)) return 0;
             continue;
         }
         Disk o = W.disks[W.found[k]];
         advance(&o, t);
-        if (meet(i, W.found[k]) && square(o.x - x) + square(o.y - y) < square(o.radius + (1 - TOUCHING) * r)) return 0;
+        double apart = square(o.radius + (1 - TOUCHING) * r);
+        if (can_collide(i, W.found[k]) && square(o.x - x) + square(o.y - y) < apart) return 0;
     }
     return 1;
 }

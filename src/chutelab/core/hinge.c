@@ -1,43 +1,42 @@
-/* Surfaces that hang on a hinge: one degree of freedom each, with a weight, a spring, a damper, stops and a
-   motor.
+/* Surfaces on a hinge: each has one degree of freedom, a weight, a spring, a damper, stops and a motor.
 
    Between impulses the angle follows
 
-       I angle'' = -spring (angle - rest) - damper angle' + weight's moment + a torque by hand,
+       I angle'' = -spring (angle - rest) - damper angle' + moment of the weight + torque by hand,
 
-   as a series of powers of the time: to rounding, since steps are short beside all of its times. What acts
-   by impulses, once a step, are contacts that last, stops and the motor; they are solved together. A blow
-   ends the step, so that all paths begin anew with the hinge's. */
+   solved as a power series in time, which is exact to rounding, as steps are short compared with all its time scales.
+   Lasting contacts, stops and the motor act by impulses once a step, and are solved together. An impact ends the step, so
+   that all paths begin anew together with the hinge's. */
 
 #include "core.h"
 
-/* Of the shortest of its times: that long is a step at most. */
+/* Longest step, as a share of the shortest time scale. */
 #define SHARE 0.5
-/* rad; so near to a stop it lies against it. */
+/* rad; a hinge this near to a stop lies on it. */
 #define AGAINST 1e-7
-/* Of the step: a stop that is met later than that is met at its end. */
+/* Share of the step: a stop that is met later than that is met at its end. */
 #define LATE 1e-6
-/* Sweeps over stop and motor of hinges that nothing touches. */
+/* Greatest number of sweeps over stops and motor of hinges that nothing touches. */
 #define ALONE 50
-/* Rounds to blow and friction of a contact that feel each other. */
+/* Greatest number of rounds for normal impulse and friction of a contact in which each changes the other. */
 #define ROUNDS 8
 
 static Mover *hinge_of(const Contact *c) { return W.movers + c->hung - 1; }
 
 static int is_hinge(const Mover *m) { return m->inertia > 0; }
 
-/* What impulses of a contact take of the angular momentum of its hinge, N m s. */
+/* Angular impulse that a contact's impulses take from its hinge, N m s. */
 static double moment_of(const Contact *c, const double *J) {
     return J[0] * c->lever[0] + J[1] * c->lever[1] + J[2] * c->lever[2];
 }
 
-/* Moment of the weight at an angle of 0, and a quarter turn further, N m. */
+/* Moment of the weight, N m, at an angle of 0 and at a quarter turn. */
 static void weigh(const Mover *m, double *now, double *ahead) {
     *now = m->moment[0] * W.gy - m->moment[1] * W.gx;
     *ahead = -m->moment[0] * W.gx - m->moment[1] * W.gy;
 }
 
-/* Lay the path from `since` on. */
+/* Set the path from `since` on. */
 static void lay_path(Mover *m) {
     double s[TERMS], c[TERMS], now, ahead, *a = m->path;
     weigh(m, &now, &ahead);
@@ -58,7 +57,7 @@ static void lay_path(Mover *m) {
     m->t = NAN;
 }
 
-/* Angle, its rate and how that changes, a time h after the path began. */
+/* Angle, angular velocity and angular acceleration at a time h after the beginning of the path. */
 static void follow_path(const Mover *m, double h, double *angle, double *rate, double *change) {
     const double *a = m->path;
     *angle = *rate = *change = 0;
@@ -69,7 +68,8 @@ static void follow_path(const Mover *m, double h, double *angle, double *rate, d
     }
 }
 
-/* By how much its angle is larger a time h after its rate was made larger, s: damper and spring take of it. */
+/* Change of the angle at a time h after a change of the angular velocity, per that change, s. It is less than h, since
+   damper and spring act meanwhile. */
 static double yields(const Mover *m, double h) {
     double before = 0, term = 1, power = 1, sum = 0;
     for (int k = 1; k < TERMS; k++) {
@@ -82,7 +82,7 @@ static double yields(const Mover *m, double h) {
     return sum;
 }
 
-/* Put a hinge where it is at t. */
+/* Set a hinge to where it is at t. */
 void set_hinge(Mover *m, double t) {
     double angle;
     follow_path(m, t - m->since, &angle, &m->turn, &m->hastens);
@@ -95,8 +95,8 @@ void set_hinge(Mover *m, double t) {
     m->t = t;
 }
 
-/* Have a hinge go its path up to t, and begin a new one; its damper takes the integral of damper rate^2. */
-static void bring(Mover *m, double t) {
+/* Move a hinge along its path up to t, and begin a new path. Its damper takes the integral of damper rate^2. */
+static void advance_hinge(Mover *m, double t) {
     double h = t - m->since, lost = 0, change, power;
     const double *a = m->path;
     if (!(h > 0)) return;
@@ -120,7 +120,7 @@ static void note(const Mover *m, double t, double rate) {
     W.swings[W.swing_count++] = (Swing){ t, m->angle, rate, m->surface, 0 };
 }
 
-/* Have a hinge begin to hang as it is written. */
+/* Set a hinge to its written position, at rest. */
 void prepare_hinge(Mover *m) {
     m->since = m->angle = m->rate = m->worked = m->stopped = m->damped = m->torque = m->pushed = 0;
     m->impulse[0] = m->impulse[1] = m->impulse[2] = 0;
@@ -142,8 +142,8 @@ double hinge_step(double h) {
     return h;
 }
 
-/* Bounds on speed and acceleration of what hangs on hinges in a step of a length h, and boxes that hold what it
-   sweeps. */
+/* Set bounds on speed and acceleration of surfaces on hinges in a step of length h, and boxes that contain what they
+   sweep. */
 void bound_hinges(double t, double h) {
     for (Surface *s = W.surfaces; s < W.surfaces + W.surface_count; s++) {
         if (s->mover < 0 || !is_hinge(W.movers + s->mover)) continue;
@@ -163,22 +163,22 @@ void bound_hinges(double t, double h) {
     }
 }
 
-/* Begin a step of a length h at t: what stops and motors ask for. */
+/* Begin a step of length h at t: what stops and motors ask for. */
 void begin_hinges(double t, double h) {
     double share = W.again;
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         double angle, rate, change;
         if (!is_hinge(m)) continue;
-        bring(m, t);
+        advance_hinge(m, t);
         m->before = m->rate;
         m->drift = m->path[2] * h;
-        /* Up to the middle of this step; the one before may have ended sooner than it was to. */
+        /* The motor acts up to the middle of this step; the step before may have ended earlier than it was to. */
         m->most = t >= m->begins ? MAX(t + 0.5 * h - MAX(m->acted, m->begins), 0) * m->motor[1] : 0;
         if (t >= m->begins) m->acted = MAX(m->acted, t + 0.5 * h);
         follow_path(m, h, &angle, &rate, &change);
         for (int n = 0; n < 2; n++) {
             int touches = n ? m->angle >= m->stops[1] - AGAINST : m->angle <= m->stops[0] + AGAINST;
-            /* As with joints, a short step takes back as small a share of what is beyond. */
+            /* As with joints, a short step corrects only as small a share of what is beyond the stop. */
             double beyond = n ? MAX(m->angle - m->stops[n], 0) : MIN(m->angle - m->stops[n], 0);
             double least = m->stops[n] + beyond * (1 - MIN(h / W.usual, 1));
             m->need[n] = touches ? (least - angle) / yields(m, h) : n ? INFINITY : -INFINITY;
@@ -188,22 +188,22 @@ void begin_hinges(double t, double h) {
     }
 }
 
-/* Of the work of a hinge's impulse J what is left when the share f of it has been given, J. */
+/* Work of a hinge's angular impulse J after the share f of it has been given, J. */
 static double work(const Mover *m, double J, double f) {
     return 0.5 * J * ((1 - f) * (1 - f) * m->before + (1 - f * f) * m->rate);
 }
 
-/* Book the work of motors, and what stops take, of the impulses behind the share f; with a sign. */
+/* Book the work of motors, and the losses at stops, of their impulses after the share f of them; times `sign`. */
 static void book_hinge(Mover *m, double f, double sign) {
     m->worked += sign * work(m, m->impulse[2], f);
     m->stopped -= sign * work(m, m->impulse[0] + m->impulse[1], f);
 }
 
-/* Have a hinge be where it is at t, when it is struck: the step ends there. On a stop that held it in this step it hops:
-   it lies there. */
+/* Set a hinge to where it is at t, when it is struck: the step ends there. If a stop held it in this step, its motion is
+   a hop: it lies on the stop. */
 void strike_hinge(int mover, double t) {
     Mover *m = W.movers + mover;
-    bring(m, t);
+    advance_hinge(m, t);
     if (m->solved) {
         note(m, t, m->rate);
         m->lies = m->impulse[0] != 0 ? 1 : m->impulse[1] != 0 ? 2 : 0;
@@ -215,7 +215,7 @@ void strike_hinge(int mover, double t) {
     W.step_end = MIN(W.step_end, t);
 }
 
-/* What stops ask for within a step, at one instant t: motors have no time to act. */
+/* Set what stops ask for at an instant t within a step; motors have no time to act. */
 void stop_hinges(double t) {
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!is_hinge(m)) continue;
@@ -229,7 +229,7 @@ void stop_hinges(double t) {
     }
 }
 
-/* Book what stops took at that instant, and let paths begin. */
+/* Book the losses at stops at that instant, and begin new paths. */
 void go_on(void) {
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!is_hinge(m)) continue;
@@ -238,7 +238,7 @@ void go_on(void) {
     }
 }
 
-/* Sweep over stops and motors of all hinges; return by how much a speed changed, rad/s. */
+/* Sweep over stops and motors of all hinges; return the greatest change of an angular velocity, rad/s. */
 static double turn_hinges(void) {
     double worst = 0;
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
@@ -271,7 +271,7 @@ static void start_hinges(void) {
     }
 }
 
-/* What hinges add to the left of the law of energy of a solve, see `check_solve`. */
+/* What hinges add to the left side of the energy law of a solve, see `check_solve`. */
 double gained_by_hinges(void) {
     double gained = 0;
     for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
@@ -284,8 +284,7 @@ double gained_by_hinges(void) {
     return gained;
 }
 
-/* Solve stops and motors where no contact acts on hinges; book them, and let the paths of the step begin.
-   A stop that is met within it ends it. */
+/* Solve stops and motors if no contact acts on hinges; book them, and begin the paths of the step. */
 void leave_hinges(double t) {
     for (int n = 0; n < ALONE && !W.swings_too; n++) {
         if (n == 0) start_hinges();
@@ -301,8 +300,8 @@ void leave_hinges(double t) {
     }
 }
 
-/* When the first hinge meets a stop in the step from t on, s, or its end: that ends the step, so that blows
-   of stops are at the ends of steps. */
+/* The time at which the first hinge meets a stop in the step that begins at t, else the end of the step, s. The step ends
+   there, so that impacts on stops are at ends of steps. */
 double meet_stops(double t, double end) {
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!is_hinge(m)) continue;
@@ -329,12 +328,12 @@ double meet_stops(double t, double end) {
     return end;
 }
 
-/* End a step at t: blows of stops, which give nothing back. */
+/* End a step at t: resolve impacts on stops, which have no restitution. */
 void end_hinges(double t) {
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!is_hinge(m)) continue;
         double side = m->struck == 2 ? 1 : -1;
-        bring(m, t);
+        advance_hinge(m, t);
         m->solved = 0;
         if (!m->struck || side * m->rate <= 0) continue;
         if (side * (m->angle - m->stops[m->struck - 1]) < -AGAINST) continue;
@@ -345,11 +344,11 @@ void end_hinges(double t) {
     }
 }
 
-/* End the run at t: what was solved last lasts for the share of its impulses that belongs to the step before. */
+/* End the run at t: the last solve counts for the share of its impulses that belongs to the step before. */
 void finish_hinges(double t) {
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!is_hinge(m)) continue;
-        bring(m, t);
+        advance_hinge(m, t);
         if (m->solved) {
             book_hinge(m, W.before, -1);
             m->rate = m->before + W.before * (m->rate - m->before);
@@ -359,7 +358,7 @@ void finish_hinges(double t) {
     }
 }
 
-/* What a contact with a hinge feels of it. */
+/* Set the levers of a contact with a hinge, and its masses with the inertia of the hinge. */
 void hang_on(Contact *c, const Mover *m, const Disk *d) {
     double turn = 1 / m->inertia, deep = d->radius + c->gap;
     double x = d->x - deep * c->nx - m->place[0], y = d->y - deep * c->ny - m->place[1];
@@ -374,42 +373,43 @@ void hang_on(Contact *c, const Mover *m, const Disk *d) {
     }
 }
 
-/* By how much a hinge has changed a relative velocity since a contact was described. */
+/* Subtract what a hinge has changed of the relative velocities since the contact was described. */
 void swing_away(const Contact *c, int earlier, double *out) {
     const Mover *m = hinge_of(c);
     double more = (earlier ? m->before : m->rate) - c->turning;
     for (int n = 0; n < 3; n++) out[n] -= c->lever[n] * more;
 }
 
-/* The same of the change of its normal velocity in this step. */
+/* Change of the normal velocity by the hinge in this step, m/s. */
 double swung_open(const Contact *c) {
     const Mover *m = hinge_of(c);
     return -c->lever[0] * (m->rate - m->before);
 }
 
-/* Give the hinge of a contact the opposite of its impulse. */
+/* Give the hinge of a contact the opposite of an impulse. */
 void push_hinge(const Contact *c, const double *J) {
     Mover *m = hinge_of(c);
     m->rate -= moment_of(c, J) / m->inertia;
 }
 
-/* Work of a contact's impulses behind the share f by what its hinge has changed its speed since, J. */
+/* Work, by the change of the hinge's angular velocity since the contact was described, of the contact's impulses after
+   the share f of them, J. */
 double swung(const Contact *c, double f) {
     const Mover *m = hinge_of(c);
     double along = moment_of(c, c->impulse);
     return work(m, along, f) - (1 - f) * along * c->turning;
 }
 
-/* Velocity of the hinge's point that is not counted in the law of energy of a solve. */
+/* Work of a contact's impulses by the angular velocity of the hinge that isn't part of the energy law of a solve, J. */
 double hinge_share(const Contact *c) { return moment_of(c, c->impulse) * c->turning; }
 
-/* What a hinge turns of a contact's normal impulse into slip, and of its tangential one into normal velocity, 1/kg. */
+/* Change of the slip per normal impulse, and of the normal velocity per tangential impulse, through the hinge, 1/kg. */
 double coupled(const Contact *c) { return c->lever[0] * c->lever[1] / hinge_of(c)->inertia; }
 
-/* The normal impulse that changes the normal velocity by so much, and the friction with it, of a contact with a
-   hinge, whose impulses feel each other; `slip` is that before. Friction never gives energy: with Newton's
-   restitution it might, where the blow itself turns the slip round (T. R. Kane and D. A. Levinson, Dynamics,
-   1985, sec. 5.7); so it is no more than what brings the slip to the opposite of what it was. */
+/* The normal impulse that changes the normal velocity by `wanted`, and the friction with it, for a contact with a hinge,
+   where each impulse changes both velocities; `slip` is that before. Friction must not create energy, as it might with
+   Newton's restitution if the impact itself reverses the slip (T. R. Kane and D. A. Levinson, Dynamics, 1985, sec. 5.7):
+   so it does no more than bring the slip to the opposite of what it was. */
 double couple(const Contact *c, double wanted, double slip, double *tangent) {
     double both = coupled(c), normal = wanted * c->mass[0];
     *tangent = 0;
@@ -426,23 +426,24 @@ double couple(const Contact *c, double wanted, double slip, double *tangent) {
     return normal;
 }
 
-/* Push what hangs on a hinge, by the owner of its surfaces, with a torque until it is pushed anew. */
+/* Turn a hinge, given by the owner of its surfaces, with a torque until the next call. */
 EXPORT void turn_hinge(int owner, double torque) {
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (m->surface != owner || !is_hinge(m)) continue;
-        bring(m, W.t);
+        advance_hinge(m, W.t);
         m->torque = torque;
         lay_path(m);
     }
 }
 
-/* Have the stop on which a hinge lies take its speed, which gives nothing back. */
+/* Let the stop on which a hinge lies take its angular velocity, without restitution. */
 static void rest_on_stop(Mover *m) {
     m->stopped += 0.5 * m->inertia * square(m->rate);
     m->rate = 0;
 }
 
-/* A path begins where a blow has changed the speed of a hinge; the stop on which it lies takes what turns it on to that. */
+/* Begin a path after an impact has changed a hinge's angular velocity. If it turns against the stop on which it lies, the
+   stop takes that. */
 void leave_struck(int mover) {
     Mover *m = W.movers + mover;
     double off = m->lies == 2 ? -m->rate : m->rate;
@@ -451,9 +452,10 @@ void leave_struck(int mover) {
     lay_path(m);
 }
 
-/* A blow that presses a hinge on the stop on which it lies strikes what stands: return whether this one does, which has
-   these impulses at its places. Then the hinge rests, they feel nothing of it, and `u` and `back` are the velocities
-   before, and those after that are asked for; but not where that ends all approach, which was a hop then. */
+/* If an impact presses a hinge against the stop on which it lies, the hinge stands like a fixed surface. Return whether
+   it does, for the impulses that are in the list. Then the hinge is at rest, its levers are 0, and `u` and `back` are the
+   velocities before, and those asked for afterwards, without its motion. If nothing approaches without that motion, which
+   was a hop, the answer is no. */
 int hold_hinge(Contact *list, int count, double (*u)[3], double *back) {
     Mover *m = list->hung ? hinge_of(list) : 0;
     double moment = 0;

@@ -3,11 +3,11 @@
 #include <string.h>
 #include "core.h"
 
-/* Restitution at which JAM blows take half of what does not slip: a disk of more is not jammed by them. */
+/* With this restitution, JAM impacts halve the normal velocity; with a larger one they don't jam a disk. */
 #define LASTING 0.9914
-/* Overlap, in radii, up to which an approach that is slow enough to be a lasting contact's may lead by the end of the
-   step: what is supported is left to the next step at so much, since a blow on a pile has no end of blows. Of corners it
-   is more, up to LATEST: a blow of boxes is passed on four times as often. */
+/* Overlap, in radii, that a slow approach of supported particles may reach by the end of the step: such an approach is
+   left to the next step, as an impact on a pile causes impacts without end. For corners the overlap is larger, and the
+   approach may be faster, up to LATEST: an impact of boxes is passed on four times as often. */
 #define LATE 1e-3
 #define LATE_CORNERS 2e-3
 
@@ -37,7 +37,7 @@ static void sift(int k) {
     place(k, i);
 }
 
-/* Set what disk i does next, and when; only what is due within the step is kept in the heap. */
+/* Set the next event of disk i and its time; only events within the step are kept in the heap. */
 void expect(int i, double due, int partner) {
     Disk *d = W.disks + i;
     d->due = due;
@@ -57,23 +57,23 @@ void expect(int i, double due, int partner) {
     }
 }
 
-/* The disk whose event is next in this step, or -1. */
+/* The disk whose event is the next in this step, or -1. */
 int next_disk(void) { return W.heap_count ? W.heap[0] : -1; }
 
-/* Approach that is no blow: of a disk by itself only what grazes; in a crowd what goes by less than
-   a tenth of TOUCH in a step, as long as gravity would do the same; without gravity, rounding. */
+/* Approach that counts as no impact, m/s. For a disk by itself that is a grazing one. In a crowd it is one that covers
+   less than a tenth of TOUCH in a step, if gravity gives as much; without gravity it is rounding. */
 double soft_approach(const Disk *d, double radius) {
     if (W.interact) return W.skip * radius * MIN(MAX(W.g * W.step / (W.skip * radius), 1e-9), 1);
     return GRAZE * sqrt(d->vx * d->vx + d->vy * d->vy);
 }
 
-/* Approach up to which a contact is left to the next step, m/s. What lies on a surface comes back to
-   it at the end of each step, as fast as gravity makes it in one, and on the inside of an arc as the
-   curved way does; of what has sunk in hardly anything. */
+/* Approach up to which a contact is left to the next step, m/s. A disk that lies on a surface comes back to it at the end
+   of each step, as fast as gravity makes it in a step, and inside an arc as fast as the curved path does. Of an approach
+   with a deep overlap hardly anything is left. */
 double left_over(const Disk *d, int impacts, int surface, double radius, int sunk) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
     if (has_corners(d)) {
-        /* A corner that lasts comes back as fast as gravity and its turning make it. */
+        /* A corner in contact comes back as fast as gravity and the rotation make it. */
         double haste = surface >= 0 ? hastes(surface_at(surface, d->t), d) : 0;
         least = MAX(least, 1.000001 * (W.g + whirl_of(d) + haste) * W.step);
         sunk = 0;
@@ -86,7 +86,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
         double haste = hastes(surface_at(surface, d->t), d);
         least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface) + haste) * W.step);
     }
-    /* Surfaces do not give way: with them it grows only if jams do not help. */
+    /* Surfaces do not give way: with them the bound grows only if jams do not help. */
     int many = sunk ? STUCK : surface >= 0 ? 2 * JAM : MANY;
     if (impacts <= many) return least;
     double most = skip * (MOST_SKIP / SKIP) * (impacts > STUCK ? pow(GROW, MIN(impacts - STUCK, 1000)) : 1);
@@ -94,32 +94,33 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     return MAX(least, MIN(skip, most));
 }
 
-/* Of two of a crowd that rest on something what is late at t, see LATE. */
+/* Approach up to which two particles of a crowd, of which one is supported, are left to the next step at t, m/s: they may
+   overlap by no more than `overlap` by its end, see LATE. */
 static double left_late(const Disk *a, const Disk *b, double overlap, double most, double t) {
     if (!W.interact || !(a->supports || b->supports) || !(t < W.step_end)) return 0;
     return MIN(most, overlap / (W.step_end - t));
 }
 
-/* What two disks leave to the next step at t. */
+/* Approach up to which two disks are left to the next step at t, m/s. */
 static double left_between(const Disk *a, const Disk *b, double radius, int sunk, double t) {
     double least = left_over(a, MAX(a->impacts, b->impacts), -1, radius, sunk);
     return sunk ? least : MAX(least, left_late(a, b, LATE * radius, W.soft, t));
 }
 
-/* The same of two particles, one with corners. */
+/* The same for two particles of which one has corners. */
 static double left_by_corners(const Disk *a, const Disk *b, int impacts, double t) {
     double small = MIN(a->inner, b->inner), least = MAX(left_over(a, impacts, -1, small, 0), left_over(b, impacts, -1, small, 0));
     if (W.contact_count <= FEW_CONTACTS) return least;
     return MAX(least, left_late(a, b, LATE_CORNERS * small, LATEST * W.soft, t));
 }
 
-/* When particle i meets j, of which one has corners, in what is left of the step after a time. */
+/* When particle i meets j, of which one has corners, between a time and the end of the step. */
 static RARELY double meet_cornered(int i, int j, double from) {
     int first = has_corners(W.disks + i) ? i : j, other = first == i ? j : i;
     const Disk *d = W.disks + first, *o = W.disks + MAX(other, 0);
     int impacts = MAX(d->impacts, other >= 0 ? o->impacts : 0);
     double most = fastest_of(first, other, from, W.step_end - from);
-    /* So much is left over of any corner. */
+    /* Any approach of a corner up to this is left to the next step. */
     if (most == INFINITY || most <= W.g * W.step) return INFINITY;
     double soft = other < 0 ? left_over(d, impacts, -1 - other, d->inner, 0) : left_by_corners(d, o, impacts, from);
     return meet_corners(first, other, from, W.step_end, most, soft);
@@ -148,8 +149,8 @@ static void foresee_pair(int i, int j, double *due, int *partner) {
     }
 }
 
-/* When a disk meets a surface after a wait, s. */
-static double meet_later(const Surface *s, const Disk *d, double wait, double *approach) {
+/* When a disk meets a surface that it can meet after a wait only. */
+static double meet_after_wait(const Surface *s, const Disk *d, double wait, double *approach) {
     Disk then = *d;
     advance(&then, d->t + wait);
     return then.t + meet_surface(surface_at((int)(s - W.surfaces), then.t), &then, W.step_end - then.t, approach);
@@ -174,9 +175,9 @@ static void foresee_surfaces(int i, double *due, int *partner) {
         const Surface *s = surface_at(k, d->t);
         if (s->mover >= 0 && !stirs(s) && d->mode == ASLEEP && d->ux == 0 && d->uy == 0) continue;
         if (!has_corners(d) && stirs(s) && closing(s, d, W.step_end - d->t) <= left_over(d, d->impacts, k, d->radius, 0)) continue;
-        double t = has_corners(d) ? meet_cornered(i, -1 - k, MAX(W.now, d->t + wait)) : wait > 0 ? meet_later(s, d, wait, &approach)
+        double t = has_corners(d) ? meet_cornered(i, -1 - k, MAX(W.now, d->t + wait)) : wait > 0 ? meet_after_wait(s, d, wait, &approach)
             : d->t + meet_surface(s, d, W.step_end - d->t, &approach);
-        /* What goes round an end within the step comes to the side that lets it through. */
+        /* A disk that moves round an end within the step arrives at the side that lets it pass. */
         if (s->one_sided && t < W.step_end) {
             Disk then = *d;
             advance(&then, t);
@@ -202,7 +203,7 @@ void foresee(int i) {
     if (d->mode == FREE) {
         for (int link = W.later_count < 0 ? -1 : d->nears; link >= 0; link = W.near_links[link]) {
             int j = W.near[link ^ 1];
-            /* Of two that the shock has moved the one that comes last looks. */
+            /* Of two disks that this shock has moved, the one that is foreseen last checks the pair. */
             if (!is_live(W.disks + j) || (is_cornered(i, j) && W.disks[j].moved == W.shocks)) continue;
             foresee_pair(i, j, &due, &partner);
         }
@@ -212,7 +213,7 @@ void foresee(int i) {
     expect(i, due, partner);
 }
 
-/* The same for all disks at the beginning of a step, from the list of pairs that may meet. */
+/* The same for all disks at the beginning of a step, by the list of pairs that may meet. */
 void foresee_all(void) {
     W.heap_count = 0;
     for (int i = W.low; i < W.high; i++) {
@@ -239,7 +240,7 @@ void foresee_all(void) {
         if (W.disks[i].far) foresee(i);
 }
 
-/* ----------------------------------------------------------------------------------- the blow */
+/* ----------------------------------------------------------------------------------- the impact */
 
 /* Note that a disk lies on a surface. */
 void hold(Disk *d, int k) {
@@ -249,7 +250,7 @@ void hold(Disk *d, int k) {
     d->supports++;
 }
 
-/* Note that a disk gets an impulse now; what it was before becomes a knot. */
+/* Note that a disk gets an impulse now; its state before it becomes a knot. */
 void was_moved(int i) {
     Disk *d = W.disks + i;
     d->impacts++;
@@ -264,8 +265,9 @@ void was_moved(int i) {
 }
 
 
-/* How much more friction, and which moment of rolling friction, stop slip and turning, v, of a contact that has got
-   its impulse: each changes what the other has to stop, so both at once, and where one is bounded the other again. */
+/* Set the further friction (more[1]) and the moment of rolling friction (more[2]) that stop slip and rolling `v` of a
+   contact that has its impulse. Each changes what the other has to stop, so both are solved together, and again if one is
+   at its bound. */
 static void stop_turning(const Contact *c, double most, double arm, const double *v, double *more) {
     const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double slip = v[1] + c->drift, shared = (c->cornered ? c->own[1] : a->radius) * a->inv_inertia;
@@ -282,7 +284,7 @@ static void stop_turning(const Contact *c, double most, double arm, const double
     }
 }
 
-/* Give a contact a normal impulse, with the friction and rolling friction that it allows, and book what it does. */
+/* Give a contact a normal impulse, with friction and rolling friction within their bounds, and book its work and losses. */
 static void give(Contact *c, double normal) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double *J = c->impulse, u[3], v[3], given[3], most = c->friction * normal;
@@ -306,7 +308,7 @@ static void give(Contact *c, double normal) {
         J[2] = more[2];
     }
     share_out(c, u, v, 0, c->entries, given);
-    /* Joints turn slip into normal velocity, and back: where one seems to gain, only the sum is known. */
+    /* Joints turn slip into normal velocity, and the reverse: if one entry seems to be a gain, only the sum counts. */
     for (int n = 1; n < 3 && tied; n++) {
         if (c->entries[n] >= 0) continue;
         c->entries[3 - n] += c->entries[n];
@@ -320,9 +322,9 @@ static void give(Contact *c, double normal) {
     if (c->hung) leave_struck(c->hung - 1);
 }
 
-/* Let a disk lie on a surface from t on. The step of a disk by itself ends here; in a crowd half of
-   what gravity will take from it within the step it gets now, and hops to the end. In a hollow it is turned
-   besides: without work where its velocity along the normal of the middle is reversed. */
+/* Let a disk lie on a surface from t on. The step of a disk by itself ends here. In a crowd the disk gets half of the
+   impulse by which gravity will act on it within the step, and hops to its end. Inside an arc its path is also turned:
+   the impulse does no work if it reverses the velocity along the normal in the middle of the path. */
 static void support(int i, int k, double t) {
     Disk *d = W.disks + i;
     Contact c;
@@ -351,7 +353,7 @@ static void support(int i, int k, double t) {
     }
 }
 
-/* Add a contact to the list that a jam solves, if it touches now; 0 if not. */
+/* Add a contact to the list of a jam if the two touch now; return whether they do. */
 static int add_touching(int i, int j, double radius, int *count) {
     Contact *c = W.earlier + *count;
     int room = TOUCHES * (W.high - W.low) - *count;
@@ -372,9 +374,9 @@ static int add_touching(int i, int j, double radius, int *count) {
     return 1;
 }
 
-/* Bring to rest what rattles without end, as far as it can: a disk, all that it touches and what
-   touches that, out to JAMMED of them, are solved at once, without restitution. The contacts of the
-   step before, which are not needed within a step, make room for the list. */
+/* Bring a disk that rattles without end to rest as far as possible: it is solved together with all disks that it touches,
+   those that these touch, and so on, up to JAMMED of them, without restitution. The list of contacts uses the memory of
+   those of the step before, which are not needed within a step. */
 static void jam(Contact *struck, double t) {
     int i = struck->i, count = 0, last = i, found, reached = 0;
     Contact *list = W.earlier;
@@ -416,8 +418,8 @@ static void jam(Contact *struck, double t) {
         }
     }
     for (int n = 0; n < count; n++) {
-        /* No approach afterwards but what would be left to the next step; separating is allowed. What has
-           sunk into a surface gets the hop that gravity will take from it. */
+        /* Afterwards nothing may approach faster than is left to the next step; opening is allowed. A disk with a deep
+           overlap with a surface gets the hop that gravity will reverse. */
         Contact *c = list + n;
         const Disk *a = W.disks + c->i;
         double u[3], r = c->j >= 0 ? MIN(a->radius, W.disks[c->j].radius) : a->radius;
@@ -433,7 +435,7 @@ static void jam(Contact *struck, double t) {
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
     W.swings_too = 0;
     for (int n = 0; n < count; n++) W.swings_too |= list[n].hung > 0;
-    /* Not hastened at first: then what rattles may never be as calm as it must be. */
+    /* Without momentum at first: with it the remaining velocities may never be small enough. */
     int ended = sweep_contacts(list, count, 0, JAM_SWEEPS, W.sweeps, 0.1 * left, left);
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
         Disk *d = W.disks + m;
@@ -444,7 +446,8 @@ static void jam(Contact *struck, double t) {
         was_moved(m);
         memcpy(&d->vx, v, sizeof v);
     }
-    /* More jams do not help where sweeps have no end: to count them as many impacts leaves more open after few. */
+    /* If the sweeps have not ended, more jams would not help: the jam counts as many impacts, so that soon more is left
+       open. */
     for (int m = i; m >= 0 && !ended; m = W.disks[m].jam_next)
         W.disks[m].impacts += W.disks[m].impacts < STUCK ? CROWDED : FEW / 2;
     account(list, count);
@@ -467,12 +470,12 @@ static void jam(Contact *struck, double t) {
     give_back(list, count);
 }
 
-/* Bring a disk by itself that lasts on a surface from its hop to the smooth path, before it is struck
-   in the middle of a step: else the hop's velocity, of first order in the step, would go on.
+/* Bring a disk by itself that lies on a surface from its hop to the smooth path, before it is struck within a step: else
+   the velocity of the hop, of first order in the step, would remain.
 
-   On the smooth path the velocity changes evenly from the last mid-step to the next; the difference is
-   an impulse of the surface, and the height of the hop goes to what its impulses lost. Endless
-   friction acts at once, not evenly: then this would undo it, and is left out after a FEW times. */
+   On the smooth path the velocity changes at a constant rate from the middle of the last step to that of the next. The
+   difference is an impulse of the surface, and the height of the hop is booked as a part of what its impulses lost.
+   Infinite friction acts at once, not at a constant rate, and this would undo it; so it is left out after FEW impacts. */
 static void end_hop(int i, double t) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
@@ -483,7 +486,8 @@ static void end_hop(int i, double t) {
     if (!last) return;
     Contact c = *last;
     double h = t - W.t, half = 0.5 * W.length, u[3], v[3], entries[3], given[3], to[3];
-    /* `held` is the smooth state at the step's beginning; half a step later it is that without hop. */
+    /* `held` is the smooth state at the beginning of the step; half a step later the smooth state is that without the
+       hop. */
     const double *from = track->held + 3;
     for (int n = 0; n < 3; n++) {
         double mid = track->after[n] + (n == 0 ? half * W.gx : n == 1 ? half * W.gy : 0);
@@ -513,7 +517,7 @@ static void end_hop(int i, double t) {
     track->lasted = 0;
 }
 
-/* Whether a disk by itself may meet another surface within a span than k and what it lies on. */
+/* Whether a disk by itself may, within a span, meet a surface other than k and those that it lies on. */
 static int meets_another(int i, int k, double span) {
     const Disk *d = W.disks + i;
     double speed = MAX(sqrt(d->vx * d->vx + d->vy * d->vy), fabs(W.surfaces[k].speed)), nx, ny;
@@ -527,7 +531,7 @@ static int meets_another(int i, int k, double span) {
     return 0;
 }
 
-/* What a blow has lifted a disk by itself off, it lies on no more. */
+/* Forget the surfaces from which an impact has lifted a disk by itself. */
 static void let_fly(Disk *d) {
     double nx, ny;
     int kept = 0;
@@ -541,7 +545,8 @@ static void let_fly(Disk *d) {
     d->held_count = kept;
 }
 
-/* Whether a disk meets a face in line with another surface that it lasts on: it only goes over to it. */
+/* Whether a disk meets a face that is in line with another surface on which it slides: it moves onto it without an
+   impact. */
 static int goes_straight_on(const Contact *c) {
     const Disk *d = W.disks + c->i;
     const Surface *s = surface_at(-1 - c->j, d->t);
@@ -554,8 +559,8 @@ static int goes_straight_on(const Contact *c) {
     return 0;
 }
 
-/* Whether a disk by itself, which does not turn, rattles at a belt, by blows of which some (`rest`: this one) hardly
-   lose anything: where a wedge narrows there is no end of blows, nor of the belt's work. */
+/* Whether a disk by itself that does not rotate rattles at a belt, with impacts of which some (`rest` is the restitution
+   of this one) lose hardly any energy. Where a wedge narrows, neither the impacts nor the work of the belt would end. */
 static int is_driven(int i, double approach, double rest) {
     const Disk *d = W.disks + i;
     double nx, ny;
@@ -571,7 +576,7 @@ static int is_driven(int i, double approach, double rest) {
     return moves && rest > LASTING;
 }
 
-/* Whether a blow's impulse is all that changed the velocity of its disk. */
+/* Whether the impulse of an impact is all that changed the velocity of its disk. */
 int is_alone(const Contact *c, const double *before) {
     const Disk *d = W.disks + c->i;
     double size = sqrt(square(c->impulse[0]) + square(c->impulse[1]));
@@ -579,8 +584,8 @@ int is_alone(const Contact *c, const double *before) {
     return fabs(change - size) <= SAME_IMPULSE * size;
 }
 
-/* Resolve the impact of disk i with disk j, or with surface k as j = -1 - k, by Newton's restitution
-   and Coulomb's friction. */
+/* Resolve the impact of disk i with disk j, or with surface k as j = -1 - k, with Newton's restitution and Coulomb's
+   friction. */
 static void strike(int i, int j, double t) {
     Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
     if (a->mode == ASLEEP) wake(i, t);
@@ -591,7 +596,7 @@ static void strike(int i, int j, double t) {
         advance(b, t);
         if (b->mode == FREE) slow_down(j, t);
     } else if (a->impacts < FEW) end_hop(i, t);
-    /* It has got clear of what let it through. */
+    /* It is clear of the surface that let it pass. */
     if (j < 0 && W.surfaces[-1 - j].one_sided) *spared_by(W.surfaces + (-1 - j), a) = 0;
     if (is_cornered(i, j)) {
         if (has_corners(a)) strike_corners(i, j, t);
@@ -609,10 +614,10 @@ static void strike(int i, int j, double t) {
     if (c.two) was_moved(j);
     relative(&c, 0, u);
     if (u[0] >= 0) return;
-    /* Contacts that yield: above 1 / falls the restitution goes with v^(-1/4). */
+    /* Restitution that falls with speed: above 1 / falls it goes with v^(-1/4). */
     if (c.falls * -u[0] > 1) c.rest /= sqrt(sqrt(c.falls * -u[0]));
     double back = -c.rest * u[0], cohesion = cohesion_of(i, j);
-    /* To be pulled off takes the force times its range. */
+    /* To pull two apart takes the work of cohesion: the force times its range. */
     if (cohesion > 0) {
         double range = TOUCH * (j < 0 ? a->radius : MIN(a->radius, b->radius));
         back = sqrt(MAX(square(back) - 2 * cohesion * range / c.mass[0], 0));
@@ -627,9 +632,9 @@ static void strike(int i, int j, double t) {
     const Surface *met = j < 0 ? surface_at(-1 - j, t) : 0;
     double press = met ? press_on(a, met, c.nx, c.ny) : 0, later = 0;
     int rests = met && back <= press * MIN(W.step, turning_time(a, met));
-    /* The bounces that are left out, infinitely many, would have taken so long. */
+    /* The bounces that are left out, infinitely many, would take so long, */
     if (rests && back > 0 && c.rest < 1) later = 2 * back / (press * (1 - c.rest));
-    /* ... unless it meets something before they end: of endless friction each of them is a blow. */
+    /* unless it meets something before they end: with infinite friction each of them is an impact. */
     if (!W.interact && later > 0 && c.friction > ROUGH && meets_another(i, -1 - j, later)) rests = later = 0;
     if (rests) back = 0;
     double before[3] = {a->vx, a->vy, a->spin};
@@ -652,7 +657,7 @@ static void strike(int i, int j, double t) {
     if (told)
         write_event(kind, i, j >= 0 ? j : -1, c.owner, t, &a->x, before, &a->vx,
                     c.impulse[0], c.impulse[1]);
-    /* Of a jam, the event does not say from where its impulse came. */
+    /* In a jam, the event doesn't say which contacts its impulse came from. */
     if (!told || (jammed && !is_alone(&c, before))) keep_impulse(&c, 1, t, t);
     else keep_carried(&c, 1, t, t);
     if (landing && !passes) a->landed = 1;
@@ -663,14 +668,13 @@ static void strike(int i, int j, double t) {
     if (rests) support(i, -1 - j, t);
 }
 
-/* Whether a lasting contact of the step is struck now as well; on smooth surfaces its partner `j` may
-   be the next piece. */
+/* Whether a lasting contact of the step is also struck now. On a smooth surface its partner `j` may be the next piece. */
 static int struck_too(const Contact *c, double t, int *j) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double nx, ny;
     *j = c->j;
     if (a->mode != FREE || (!W.interact && c->impulse[0] == 0)) return 0;
-    /* What has joints is struck as a step begins. */
+    /* A particle with joints is struck only at the beginning of a step. */
     if (t > W.t && (is_tied(c->i) || is_tied(c->j))) return 0;
     advance(a, t);
     if (c->cornered) {
@@ -683,7 +687,7 @@ static int struck_too(const Contact *c, double t, int *j) {
             double x = a->vx - b->vx, y = a->vy - b->vy, turns = fabs(a->spin) * a->radius + fabs(b->spin) * b->radius;
             if (turns < soft && x * x + y * y <= square(soft - turns)) return 0;
         } else soft = left_over(a, a->impacts, -1 - c->j, a->inner, 0);
-        /* At the places that last it approaches no faster: what has turned or closed since is foreseen. */
+        /* At the places in contact it must approach faster than that; what has rotated or closed since is foreseen. */
         int moves = c->j < 0 && stirs(W.surfaces + (-1 - c->j));
         for (const Contact *o = c; o >= W.contacts && o->i == c->i && o->j == c->j && !moves; o--) {
             relative(o, 0, u);
@@ -713,7 +717,7 @@ static int struck_too(const Contact *c, double t, int *j) {
         && approach > left_between(a, b, r, d < a->radius + b->radius - SUNK * r, t);
 }
 
-static void queue_up(int i, int *tail) {
+static void enqueue(int i, int *tail) {
     Disk *d = W.disks + i;
     if (d->queued) return;
     d->queued = 1;
@@ -721,16 +725,16 @@ static void queue_up(int i, int *tail) {
     *tail = (*tail + 1) % (W.disk_count + 1);
 }
 
-/* Resolve an impact and what follows from it at the same instant: a disk that was pushed against
-   others it touches gives on what it got, first come first served. */
+/* Resolve an impact and those that follow from it at the same instant: a disk that is pushed against others passes its
+   impulse on, in the order of a queue. */
 void shock(int i, int j, double t) {
     int head = 0, tail = 0, budget = SHOCKS * W.contact_count;
     W.moved_count = W.woken = 0;
     W.shocks++;
     W.now = t;
     strike(i, j, t);
-    queue_up(i, &tail);
-    if (j >= 0 && W.disks[j].mode == FREE) queue_up(j, &tail);
+    enqueue(i, &tail);
+    if (j >= 0 && W.disks[j].mode == FREE) enqueue(j, &tail);
     while (head != tail) {
         int m = W.queue[head];
         head = (head + 1) % (W.disk_count + 1);
@@ -745,8 +749,8 @@ void shock(int i, int j, double t) {
             if (budget <= 0 || again || !struck_too(c, t, &partner)) continue;
             budget--;
             strike(c->i, partner, t);
-            queue_up(c->i, &tail);
-            if (partner >= 0) queue_up(partner, &tail);
+            enqueue(c->i, &tail);
+            if (partner >= 0) enqueue(partner, &tail);
         }
     }
     for (int k = 0; k < W.moved_count; k++) {
@@ -768,14 +772,14 @@ void shock(int i, int j, double t) {
     }
 }
 
-/* Let a disk that starts on a surface lie there at once, as one that was just struck. */
+/* Let a disk that is released on a surface lie on it at once, like one that was just struck. */
 void lie_down(int i) {
     Disk *d = W.disks + i;
     for (int k = 0; k < W.surface_count; k++) {
         const Surface *s = surface_at(k, d->t);
         double nx, ny, v[3];
         if (has_corners(d)) {
-            /* It is held from the next step on, which begins now. */
+            /* It becomes a contact in the next step, which begins now. */
             if (s->there == THERE && !is_spared(s, d) && lies_flat(i, k)) {
                 d->on = s->owner;
                 d->slips = 1;

@@ -1,24 +1,25 @@
 /* Joints: strings, rods, springs and pins.
 
-   A joint gives the same force all through a step, along the mean of its directions at both ends of it: half of
-   its impulse before the flight, half after it. So its work is the force times the change of its length, exactly:
-   none for a rod, and what a spring keeps less of it (Gonzalez, J. Nonlinear Sci. 6, 1996). All forces are found
-   together, by Newton's steps, such that lengths are right at the end of the step: they do not drift. What is
-   struck, or pulled tight, gets impulses of its joints at the same instant. */
+   A joint gives the same force all through a step, along the mean of its directions at both ends of the step: half of its
+   impulse before the flight, half after it. So its work is exactly the force times the change of its length: 0 for a rod,
+   and for a spring what its energy falls by (Gonzalez, J. Nonlinear Sci. 6, 1996). All forces are found together, by
+   Newton's method, such that the lengths are right at the end of the step: they do not drift. If a particle is struck, or
+   a string becomes tight, the joints give their impulses at the same instant. */
 
 #include <string.h>
 #include "core.h"
 
-/* Of its length: a string that is shorter by less is tight. */
+/* Share of its length; a string that is shorter by less is tight. */
 #define BAND 1e-9
-/* Newton's steps; times that strings are let go; times that a step is cut for one that is pulled tight. */
+/* Greatest number of Newton steps; of times that strings are released; of times that a step is cut where a string becomes
+   tight. */
 #define NEWTON 40
 #define LETS_GO 20
 #define CUTS 4
-/* Of all lengths: what rounding leaves, and from where on steps that do not help any more are rounding. */
+/* Share of a length: error by rounding, and error below which steps that no longer reduce it count as rounding. */
 #define ROUNDS 4e-16
 #define FINE 1e-13
-/* Of the diagonal: a row of which less is left says what others have said. */
+/* Share of the diagonal: a row with a smaller pivot depends on the others. */
 #define DEPENDS 1e-13
 /* Times that joints and contacts are solved for in turn; of the accuracy of the contacts. */
 #define TURNS 50
@@ -26,9 +27,10 @@
 /* m/s on Earth; what is left of that where there are FEW_CONTACTS at most. */
 #define FINE_TURNS 1e-10
 
-/* Of a step: of a shorter one velocities say more than lengths. */
+/* Share of the usual step; in a shorter one velocities are more exact than lengths. */
 #define BRIEF 0.1
 
+/* Share of a length by which the latest solve misses a length; 0 if that is rounding. */
 static double missed;
 /* Whether lengths are as far from what they are to be as steps that ended in rounding are not. */
 static int is_rough;
@@ -42,18 +44,18 @@ static Pose pose_at(const Disk *d, double h) {
     return (Pose){ d->x + (d->vx + 0.5 * W.gx * h) * h, d->y + (d->vy + 0.5 * W.gy * h) * h, d->turned + d->spin * h };
 }
 
-/* A pin's arm from the centre of a particle that has turned. */
+/* The arm of a pin from the centre of a particle that has rotated. */
 static void turn_arm(const double *arm, double turned, double *out) {
     double c = cos(turned), s = sin(turned);
     out[0] = c * arm[0] - s * arm[1];
     out[1] = s * arm[0] + c * arm[1];
 }
 
-/* Whether a joint is a string between two particles that runs over a pulley, a point without mass or friction. */
+/* Whether a joint is a string between two particles over a pulley: a point without mass or friction. */
 static int has_pulley(const Joint *j) { return j->kind == STRING && j->other >= 0 && !isnan(j->from[0]); }
 
-/* The vectors that a joint keeps or changes the length of: from its other end to its particle, and none; over a
-   pulley from there to both. */
+/* The two vectors whose lengths add up to that of a joint: from its other end to its particle, and 0; or from a pulley to
+   both particles. `h` is the time since the beginning of the step. */
 static void between(const Joint *j, double h, double *out) {
     Pose a = pose_at(W.disks + j->particle, h);
     const double *fixed = j->from;
@@ -81,27 +83,27 @@ static void between(const Joint *j, double h, double *out) {
 
 static double size(const double *v) { return sqrt(v[0] * v[0] + v[1] * v[1]); }
 
-/* The length of what `between` gives. */
+/* The length of a joint, from the vectors of `between`. */
 static double length_of(const double *d) { return size(d) + size(d + 2); }
 
 static double kept_in(const Joint *j, double length) { return 0.5 * j->stiffness * square(length - j->length); }
 
 static int rows_of(const Joint *j) { return 1 + (j->kind == PIN); }
 
-/* Whether the string of a joint is as long as it can be. */
+/* Whether a string is as long as it can be. */
 static int is_tight(const Joint *j) {
     double d[4];
     between(j, 0, d);
     return length_of(d) >= (1 - BAND) * j->length;
 }
 
-/* A particle of an end of a joint, as `Disk.tie` counts them, or NULL. */
+/* The particle at an end of a joint, as `Disk.tie` counts ends, or NULL. */
 static Disk *at_end(int end) {
     int i = end % 2 ? W.joints[end / 2].other : W.joints[end / 2].particle;
     return i < 0 ? 0 : W.disks + i;
 }
 
-/* Have a particle move by an impulse of a row at one of its ends, times so much. */
+/* Change velocity and spin of the particle at one end of a row by an impulse `kick`, N s. */
 static void tug(const JointRow *r, int end, double kick, double *v, double *spin) {
     const Disk *d = at_end(2 * r->joint + end);
     v[0] += kick * r->e[2 * end] * d->inv_mass;
@@ -109,7 +111,7 @@ static void tug(const JointRow *r, int end, double kick, double *v, double *spin
     *spin += kick * r->lever[end] * d->inv_inertia;
 }
 
-/* Whether two particles are parts of one, joined by a rod or a pin: they do not meet. */
+/* Whether two particles are joined by a rod or a pin: then they do not collide. */
 int are_joined(int i, int j) {
     for (int end = W.disks[i].tie; end >= 0; end = W.joints[end / 2].next[end % 2]) {
         const Joint *joint = W.joints + end / 2;
@@ -123,15 +125,15 @@ int are_joined(int i, int j) {
 
 static double *cell(int p, int q) { return W.joint_matrix + (long)p * W.joint_row_count + q; }
 
-/* What an impulse of 1 N s of one row changes of the speed of another, by the particle at one end, 1/kg. */
-static double feels(const JointRow *p, int end, const JointRow *q, int with) {
+/* Change of the rate of one row by an impulse of 1 N s of another, through the particle at one end, 1/kg. */
+static double rate_change(const JointRow *p, int end, const JointRow *q, int with) {
     const Disk *d = at_end(2 * p->joint + end);
     const double *e = p->e + 2 * end, *f = q->e + 2 * with;
     return (e[0] * f[0] + e[1] * f[1]) * d->inv_mass + p->lever[end] * q->lever[with] * d->inv_inertia;
 }
 
-/* Fill in the matrix of the rows that act, `scale` times what impulses change, and factor it: L D L^T within the
-   envelope of its rows, which in a chain is as wide as a row or two. */
+/* Set the matrix of the rows that act, `scale` times the effect of impulses, and factor it: L D L^T within the envelope
+   of its rows, which in a chain has a width of one or two. */
 static void factor(double scale, int eases) {
     JointRow *rows = W.joint_rows;
     for (int p = 0; p < W.joint_row_count; p++) {
@@ -146,7 +148,7 @@ static void factor(double scale, int eases) {
                     const Joint *j = W.joints + other / 2;
                     for (int q = j->row; j->tied && q < j->row + rows_of(j) && q <= p; q++) {
                         if (!rows[q].on) continue;
-                        if (pass) *cell(p, q) += scale * feels(r, end, rows + q, other % 2);
+                        if (pass) *cell(p, q) += scale * rate_change(r, end, rows + q, other % 2);
                         else r->first = MIN(r->first, q);
                     }
                 }
@@ -164,7 +166,7 @@ static void factor(double scale, int eases) {
     }
 }
 
-/* Solve for what is in `off` of the rows that act: it becomes the impulses that make as much of it. */
+/* Solve for the right side that is in `off` of the rows that act; `off` becomes the solution. */
 static void solve(void) {
     JointRow *rows = W.joint_rows;
     for (int p = 0; p < W.joint_row_count; p++)
@@ -182,10 +184,10 @@ static void solve(void) {
 
 /* ----------------------------------------------------------------------------------------- a step */
 
-/* The rows of a joint whose vector goes from d0 to d1 within h: how they act, and by how much they are missed. */
+/* Set the rows of a joint whose vectors change from d0 to d1 within h: how they act, and by how much they are missed. */
 static void aim(const Joint *j, const double *d0, const double *d1, double h) {
     JointRow *r = W.joint_rows + j->row;
-    /* A short step takes back as small a share of what it begins with: else it would do so at any speed. */
+    /* A short step corrects only as small a share of an initial error; else it would do so at any speed. */
     double share = MIN(h / W.usual, 1);
     if (j->kind == PIN) {
         for (int n = 0; n < 2; n++, r++) {
@@ -217,7 +219,7 @@ static void aim(const Joint *j, const double *d0, const double *d1, double h) {
     r->off += r->eases * r->kick;
 }
 
-/* Give the particles half of what the rows pull, instead of what they had of it. */
+/* Give the particles half of the pull of the rows, instead of what they had of it. */
 static void pull(void) {
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
@@ -253,7 +255,7 @@ void drop_tugs(void) {
     for (int i = W.low; i < W.high; i++) memset(W.disks[i].tug, 0, sizeof W.disks[i].tug);
 }
 
-/* The same as the step begins, of what missed and may be of any size: velocities are as they were noted. */
+/* The same at the beginning of a step, for a pull that missed and may have any size: velocities are restored. */
 void forget_tugs(void) {
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
@@ -295,7 +297,7 @@ void pull_joints(double h) {
             for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
                 double d0[4], d1[4];
                 if (!W.joint_rows[j->row].on) continue;
-                /* Where it is now: without the flight. */
+                /* Where it is now, without the flight. */
                 between(j, 0, d0);
                 between(j, h, d1);
                 aim(j, d0, d1, h);
@@ -337,7 +339,7 @@ void pull_joints(double h) {
     for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) missed = MAX(missed, longer(j, h) - BAND);
 }
 
-/* The instant within (0, h] at which a string that is slack is pulled tight, INFINITY if it is not. */
+/* The instant within (0, h] at which a slack string becomes tight, INFINITY if it does not. */
 static double snaps(const Joint *j, double h) {
     double d[4], low = 0, high = h;
     if (j->kind != STRING || !j->tied || W.joint_rows[j->row].on || is_tight(j)) return INFINITY;
@@ -365,14 +367,14 @@ void cut_step(double t) {
     }
 }
 
-/* Whether something else has ended the step sooner: then the forces are found anew. */
+/* Whether the step has been cut by something else: then the forces are found anew. */
 int is_cut(void) {
     if (pulled_to == W.step_end) return 0;
     cut_step(W.step_end);
     return 1;
 }
 
-/* End the step where a string is pulled tight. */
+/* End the step where a string becomes tight. */
 void cut_at_snaps(void) {
     for (int n = 0; n < CUTS; n++) {
         double h = W.step_end - W.t, first = INFINITY;
@@ -382,7 +384,7 @@ void cut_at_snaps(void) {
     }
 }
 
-/* How fast a joint is drawn apart, m/s. */
+/* Rate at which a joint becomes longer, m/s. */
 static double rate_of(const JointRow *r) {
     double sum = 0;
     for (int end = 0; end < 2; end++) {
@@ -393,8 +395,9 @@ static double rate_of(const JointRow *r) {
     return sum;
 }
 
-/* What a row gave to its particles in a step of length h that now ends, J: half of its impulse before the flight, half
-   after it, each times the mean of the velocities before and after it; from the velocities between both. */
+/* Work of a row on its particles in a step of length h that ends now, J: half of its impulse before the flight, half
+   after it, each times the mean of the velocities before and after it. It is computed from the present velocities, before
+   the second half. */
 static double worked(const JointRow *r, double h) {
     double falls = 0;
     for (int end = 0; end < 2; end++)
@@ -402,7 +405,7 @@ static double worked(const JointRow *r, double h) {
     return r->kick * (2 * rate_of(r) - falls);
 }
 
-/* Give the other half of the step's pull, at its end, and book what springs gave and took. */
+/* Give the other half of the step's pull, at its end, and book the energy that springs gave and lost. */
 void end_pull(void) {
     double h = W.step_end - W.t, d[4];
     for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
@@ -435,7 +438,7 @@ void end_pull(void) {
     }
 }
 
-/* Add up all springs, as `Total` has them. */
+/* Add up all springs, as in `Total`. */
 void add_springs(double *sums) {
     for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
         const double own[4] = {j->kept[0], j->kept[1], j->damped, j->given};
@@ -443,9 +446,9 @@ void add_springs(double *sums) {
     }
 }
 
-/* ------------------------------------------------------------------------------------------ blows */
+/* ------------------------------------------------------------------------------------------ impacts */
 
-/* Let the rows of struck joints act at this instant; of strings those that are tight, or that are `taut`. */
+/* Let the rows of struck joints act at this instant; of strings those that are tight, or only those that are `taut`. */
 static void aim_now(int taut) {
     for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
         JointRow *r = W.joint_rows + j->row;
@@ -459,7 +462,7 @@ static void aim_now(int taut) {
     }
 }
 
-/* Let go of strings that would push; return whether there is one. */
+/* Release strings that would push; return whether there are any. */
 static int let_go(void) {
     int found = 0;
     for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) {
@@ -473,7 +476,7 @@ static int let_go(void) {
     return found;
 }
 
-/* Give all particles what is in `off` of the rows, as impulses. */
+/* Give the particles the impulses that are in `off` of the rows. */
 static void give_impulses(void) {
     for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++)
         for (int end = 0; end < 2 && r->on; end++) {
@@ -484,7 +487,7 @@ static void give_impulses(void) {
         }
 }
 
-/* Mark as struck all that is tied to what is struck. */
+/* Mark all joints that are connected to struck ones as struck. */
 static void spread_struck(void) {
     for (int more = 1; more;) {
         more = 0;
@@ -500,7 +503,7 @@ static void spread_struck(void) {
     }
 }
 
-/* Stop what draws struck joints apart, or presses them together, without restitution. */
+/* Stop the rates of struck joints, without restitution. */
 static void stop(void) {
     spread_struck();
     aim_now(0);
@@ -509,7 +512,7 @@ static void stop(void) {
         factor(1, 0);
         solve();
     } while (let_go());
-    /* Of rows that are solved together only the sum is known: those that seem to gain, gain nothing. */
+    /* For rows that are solved together only the sum of the losses has a meaning: a gain becomes 0. */
     double all = 0, losses = 0;
     for (const JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) {
         double loss = r->on ? -0.5 * r->off * rate_of(r) : 0;
@@ -526,8 +529,8 @@ static void stop(void) {
     give_impulses();
 }
 
-/* Begin a step: tie what has been released, and take up strings that have been pulled tight. What lasts has a rest
-   of second order along its joints, which is left. */
+/* Begin a step: tie joints whose particles have been released, and stop strings that have become tight. Particles in
+   contact keep a rate of second order along their joints. */
 void tie_joints(void) {
     int fresh = 0;
     W.moved_count = 0;
@@ -570,7 +573,7 @@ void tie_joints(void) {
         if (W.disks[i].tie >= 0 && W.disks[i].mode == FREE && !W.tracks[i].lasted) track_flying(i);
 }
 
-/* Begin a blow between two particles, or of one, of which one is tied at least. */
+/* Begin an impact of one or two particles, of which at least one has joints. */
 void strike_joints(int i, int j) {
     for (Joint *one = W.joints; one < W.joints + W.joint_count; one++)
         one->struck = one->tied && (one->particle == i || one->other == i
@@ -578,7 +581,7 @@ void strike_joints(int i, int j) {
     stop();
 }
 
-/* End such a blow: it may have pulled strings tight. */
+/* End such an impact: it may have made strings tight. */
 void end_blow(void) {
     for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
         if (!j->struck || j->kind != STRING || j->taut || !is_tight(j)) continue;
@@ -591,9 +594,9 @@ void end_blow(void) {
     }
 }
 
-/* The impulses of a blow, normal and tangential, that change the normal velocity by so much, where joints pass on
-   their share at the same instant: they give theirs here. Where restitution and friction would give more than
-   is there (Kane, J. Appl. Mech. 51, 1984), there is no friction. `u` are normal velocity and slip before. */
+/* The normal and tangential impulse of an impact that change the normal velocity by `wanted`, m/s, if joints respond at
+   the same instant; they give their impulses here. If restitution and friction together would create energy (Kane, J.
+   Appl. Mech. 51, 1984), there is no friction. `u` are normal velocity and slip before. */
 void share_with_joints(const Contact *c, double wanted, const double *u, double *J) {
     JointRow *rows = W.joint_rows, *end = rows + W.joint_row_count;
     const double way[2][2] = {{c->nx, c->ny}, {c->ny, -c->nx}}, both = c->hung ? coupled(c) : 0;
@@ -622,7 +625,7 @@ void share_with_joints(const Contact *c, double wanted, const double *u, double 
             for (int n = 0; n < 4; n++) feel[n / 2][n % 2] += r->struck[n / 2] * r->answer[n % 2];
         double less = feel[0][0] * feel[1][1] - feel[0][1] * feel[1][0];
         J[0] = J[1] = 0;
-        /* Joints may hold it as it is. */
+        /* Joints may hold it entirely. */
         if (!(feel[0][0] > DEPENDS / c->mass[0])) break;
         J[0] = wanted / feel[0][0];
         if (c->friction > 0 && less > DEPENDS * feel[0][0] * feel[1][1]) {
@@ -645,7 +648,8 @@ void share_with_joints(const Contact *c, double wanted, const double *u, double 
     give_impulses();
 }
 
-/* Let joints answer blows at several places, which are found one by one, at this instant; see `answer_with_joints`. */
+/* Let joints respond to an impact at several places, whose impulses are found one by one, at this instant; see
+   `answer_with_joints`. */
 void begin_answers(void) {
     aim_now(1);
     factor(1, 0);
@@ -660,7 +664,7 @@ void forget_answers(void) {
     for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) r->answer[0] = 0;
 }
 
-/* Have joints give impulses such that nothing is drawn apart by what has been given to particles. */
+/* Give the joints' impulses that stop the rates caused by the impulses given to particles so far. */
 void answer_with_joints(void) {
     for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) r->off = -rate_of(r);
     solve();
@@ -673,7 +677,7 @@ void answer_with_joints(void) {
     }
 }
 
-/* Let go of strings that have pushed by their answers, and take all of these back; return whether there is one. */
+/* Release strings that would push by their responses, and take all responses back; return whether there are any. */
 int let_go_again(void) {
     JointRow *rows = W.joint_rows, *last = rows + W.joint_row_count;
     for (JointRow *r = rows; r < last; r++) r->off = r->answer[0];

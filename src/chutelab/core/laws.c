@@ -61,7 +61,7 @@ static double height(const double *knot) { return up[0] * knot[1] + up[1] * knot
 static double potential(int i, const double *knot) { return L.bodies[i].mass * L.bodies[i].gravity * height(knot); }
 
 /* Energy at a knot less what the ledger explains, J. */
-static double gain(int i, const double *knot) {
+static double unexplained(int i, const double *knot) {
     return kinetic(i, knot) + potential(i, knot) - (knot[6] - knot[7] - knot[8]);
 }
 
@@ -166,7 +166,7 @@ PAIRED static int scan_track(int i) {
     if (!is_released(i)) return 1;
     const double *first = KNOT(L.offsets[i]), *last = KNOT(last_of(i));
     double mass = L.bodies[i].mass, half = 0.5 * mass, turning = 0.5 * L.bodies[i].inertia;
-    double weight = mass * L.bodies[i].gravity, begin = gain(i, first), before = begin;
+    double weight = mass * L.bodies[i].gravity, begin = unexplained(i, first), before = begin;
     int is_nip = L.engine == ENGINE_CONTACT && !L.interact, row = L.row;
     /* Greatest |x| and |y|; greatest change of the unexplained energy, and energy in play; greatest square of the speed;
        least of `given_back`; and the sum of all numbers, which times zero is zero if they are finite. */
@@ -393,9 +393,9 @@ static double risen(void) {
             const double *first = KNOT(L.offsets[i]), *last = KNOT(last_of(i));
             int k = knot_before(i, t);
             if (last[0] < t) {
-                sum += gain(i, last) - gain(i, first);
+                sum += unexplained(i, last) - unexplained(i, first);
             } else if (k >= 0) {
-                sum += MIN(gain(i, KNOT(k)), gain(i, KNOT(k + 1))) - gain(i, first);
+                sum += MIN(unexplained(i, KNOT(k)), unexplained(i, KNOT(k + 1))) - unexplained(i, first);
             }
         }
         found = MAX(found, sum);
@@ -505,8 +505,8 @@ static void judge_books(double bound) {
     if (crowd) is_sound = !(count = beyond_overlaps(most, instants, &least));
     for (int i = 0; i < L.particle_count && (L.interact || !is_sound); i++) {
         if (!is_released(i)) continue;
-        double first = gain(i, KNOT(L.offsets[i])), before = first;
-        if (L.interact) residual += gain(i, KNOT(last_of(i))) - first;
+        double first = unexplained(i, KNOT(L.offsets[i])), before = first;
+        if (L.interact) residual += unexplained(i, KNOT(last_of(i))) - first;
         for (int k = L.offsets[i] + 1; k < L.offsets[i + 1] && !is_sound; k++) {
             double own = given_back(KNOT(k));
             int told = own < -most;
@@ -519,7 +519,7 @@ static void judge_books(double bound) {
                 add(&backs, i, k);
             }
             if (L.interact) continue;
-            double now = gain(i, KNOT(k)), change = fabs(now - before);
+            double now = unexplained(i, KNOT(k)), change = fabs(now - before);
             before = now;
             if (change <= most) continue;
             rise = MAX(rise, change);

@@ -1,20 +1,21 @@
-/* Surfaces whose motion is prescribed: where one is at a time, how fast, and when a disk meets it.
+/* Surfaces with a prescribed motion: position and velocity at a time, and when a disk meets one.
 
-   Code that asks for a surface's place puts it there first, by `surface_at`: disks are at times of
-   their own within a step. Its pivot p shakes and travels, and it turns about that:
+   Code that needs a surface's position sets it first, by `surface_at`: within a step each disk has its own time. The
+   pivot p shakes and travels, and the surface turns about it:
 
        p(t) = p0 + by sin(2 pi f t + phase) + way share(t),    angle(t) = turn t,
 
-   where the share goes from 0 to 1 with an even acceleration up to the middle, and the same
-   against it from there on. */
+   where the share goes from 0 to 1, with constant acceleration up to half of its time, and the opposite acceleration from
+   there on. */
 
 #include "core.h"
 
 #define PI 3.14159265358979323846
 
-/* Pieces that a span is looked at in, at least: a touch that comes and goes within one is left to the next step. */
+/* Least number of parts into which a span is divided for the search; a contact that begins and ends within one part is
+   left to the next step. */
 #define STRIDES 8
-/* Newton's steps and halvings to the instant of an impact, to its last bit. */
+/* Greatest number of iterations (Newton, bisection) to the instant of an impact; they reach its last bit. */
 #define TO_ROOT 100
 
 static int travels(const Mover *m, double t) {
@@ -56,7 +57,7 @@ static Mover *mover_of(const Surface *s) {
     return m;
 }
 
-/* Put a surface where it is at t. */
+/* Set a surface to where it is at t. */
 const Surface *move_to(Surface *s, double t) {
     s->posed = t;
     const Mover *m = mover_of(s);
@@ -70,7 +71,7 @@ const Surface *move_to(Surface *s, double t) {
     return s;
 }
 
-/* Velocity of what moves along with a surface at a place, m/s, and its spin. */
+/* Velocity of a point that moves with a surface, m/s, and its angular velocity, rad/s. */
 void carried(const Surface *s, double x, double y, double *v) {
     v[0] = v[1] = v[2] = 0;
     if (s->mover < 0) return;
@@ -80,8 +81,8 @@ void carried(const Surface *s, double x, double y, double *v) {
     v[2] = m->turn;
 }
 
-/* Velocity of a disk in the frame in which its way along a surface bends as the surface does: round the
-   centre of what is bent, which need not turn with it. */
+/* Velocity of a disk in the frame in which its path along a surface has the curvature of the surface, m/s. For an arc
+   that frame moves with its centre and does not rotate. */
 void along_with(const Surface *s, const Disk *d, double *v) {
     double frame[3];
     if (s->shape == SEGMENT) carried(s, d->x, d->y, frame);
@@ -90,8 +91,8 @@ void along_with(const Surface *s, const Disk *d, double *v) {
     v[1] = d->vy - frame[1];
 }
 
-/* Acceleration by which a surface that moves escapes a disk beside it, m/s2: along the normal, with what
-   its turning does to the disk's way along it; `pull` is that along the tangent (ny, -nx). */
+/* Acceleration of a moving surface away from a disk next to it, m/s2: along the normal, with the Coriolis part of the
+   disk's motion along the surface; `pull` is that along the tangent (ny, -nx). */
 double pulled(const Surface *s, const Disk *d, double nx, double ny, double *pull) {
     *pull = 0;
     if (s->mover < 0) return 0;
@@ -104,7 +105,7 @@ double pulled(const Surface *s, const Disk *d, double nx, double ny, double *pul
     return ax * nx + ay * ny + 2 * m->turn * ((d->vx - v[0]) * ny - (d->vy - v[1]) * nx);
 }
 
-/* Bound on the acceleration by which a surface presses or leaves what lies on it, m/s2. */
+/* Bound on the acceleration with which a surface presses on, or moves away from, a disk that lies on it, m/s2. */
 double hastes(const Surface *s, const Disk *d) {
     double v[3];
     if (!stirs(s)) return 0;
@@ -112,7 +113,7 @@ double hastes(const Surface *s, const Disk *d) {
     return s->haste + 2 * fabs(v[2]) * hypot(d->vx - v[0], d->vy - v[1]);
 }
 
-/* Bound on the speed with which a disk and a surface come nearer to each other within a span, m/s. */
+/* Bound on the speed at which a disk and a surface approach each other within a span, m/s. */
 double closing(const Surface *s, const Disk *d, double span) {
     double v[3];
     carried(s, d->x, d->y, v);
@@ -120,7 +121,7 @@ double closing(const Surface *s, const Disk *d, double span) {
     return way * (1 + fabs(v[2]) * span) + (W.g + hastes(s, d)) * span;
 }
 
-/* Gap after a time h, and how fast it closes. */
+/* The gap after a time h, m, and the speed at which it closes. */
 static double gap_after(int k, const Disk *d, double h, double *rate) {
     double x = d->x + (d->vx + 0.5 * W.gx * h) * h, y = d->y + (d->vy + 0.5 * W.gy * h) * h, nx, ny, v[3];
     const Surface *now = surface_at(k, d->t + h);
@@ -130,9 +131,9 @@ static double gap_after(int k, const Disk *d, double h, double *rate) {
     return gap;
 }
 
-/* Time from d->t until a disk meets a surface that moves, INFINITY if not within the span. It is looked at
-   in strides in which they cannot meet, or a share of the span; between two of which they do,
-   the instant is found by Newton's method with halvings. */
+/* Time from d->t until a disk meets a moving surface, INFINITY if not within the span. The search advances by steps in
+   which they cannot meet, but at least by a share of the span; if they meet between two of these, Newton's method with
+   bisection finds the instant. */
 double meet_moving(int k, const Disk *d, double span, double *approach) {
     const Surface *s = W.surfaces + k;
     double most = closing(s, d, span), h = 0, rate, gap = gap_after(k, d, 0, &rate), low = 0;
@@ -165,7 +166,7 @@ double meet_moving(int k, const Disk *d, double span, double *approach) {
     return face_at(s, x, y) == s ? h : INFINITY;
 }
 
-/* How long a disk that flies alone cannot reach what a surface sweeps, s. */
+/* Time within which a disk that flies alone cannot reach the region that a surface sweeps, s. */
 double box_span(const Surface *s, const Disk *d) {
     const double *box = s->swept;
     double x = MAX(MAX(box[0] - d->x, d->x - box[2]), 0), y = MAX(MAX(box[1] - d->y, d->y - box[3]), 0);
@@ -175,7 +176,8 @@ double box_span(const Surface *s, const Disk *d) {
     return v > 0 ? room / v : INFINITY;
 }
 
-/* When the next surface begins to travel, is half-way, or is there, s. */
+/* The next time at which a surface begins to travel, is half-way, arrives, begins to move, or stops being turned by hand,
+   s. */
 double next_turn(double t) {
     double next = INFINITY;
     for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++)
@@ -188,7 +190,7 @@ double next_turn(double t) {
     return next;
 }
 
-/* Tell which surfaces move in the step that begins at t; 1 if that has changed. */
+/* Set which surfaces move in the step that begins at t; return whether that has changed. */
 int stir(double t) {
     int changed = 0;
     W.haste = W.stirs = 0;
@@ -203,7 +205,7 @@ int stir(double t) {
     return changed;
 }
 
-/* Have the box of a surface hold it where it is, and more round it, m. */
+/* Set the box of a surface round its present position, with a margin, m. */
 void box_around(Surface *s, double more) {
     for (int n = 0; n < 2; n++) {
         int round = s->shape != SEGMENT;
@@ -212,7 +214,7 @@ void box_around(Surface *s, double more) {
     }
 }
 
-/* Have the boxes of what moves hold what it sweeps in a step from t on of a length h. */
+/* Set the boxes of moving surfaces to what they sweep in a step of length h from t on. */
 void box_movers(double t, double h) {
     for (Surface *s = W.surfaces; s < W.surfaces + W.surface_count && W.mover_count; s++) {
         if (s->mover < 0) continue;
@@ -221,7 +223,7 @@ void box_movers(double t, double h) {
     }
 }
 
-/* Have a box hold all that what is in it sweeps; it reaches so far from the pivot. */
+/* Enlarge a box to the region that its contents sweep; these extend up to `reach` from the pivot. */
 static void sweep_box(const Mover *m, double reach, double *box) {
     for (int k = 0; k < 4; k++) {
         double way = m->way[k % 2], by = fabs(m->by[k % 2]);
@@ -230,14 +232,14 @@ static void sweep_box(const Mover *m, double reach, double *box) {
     }
 }
 
-/* The motion of a surface, or -1. */
+/* The number of the motion of a surface, or -1. */
 int find_mover(const Surface *s) {
     for (int k = 0; k < W.mover_count; k++)
         if (W.movers[k].surface == s->owner) return k;
     return -1;
 }
 
-/* Have a surface begin to move from where it is written. */
+/* Let a surface begin to move from its written position. */
 void prepare_mover(Surface *s) {
     Mover *m = W.movers + s->mover;
     double x = MAX(fabs(s->box[0] - m->pivot[0]), fabs(s->box[2] - m->pivot[0]));

@@ -1,20 +1,19 @@
-/* Islands that lie still, or ride a belt all alike, fall asleep: they are not solved until something
-   touches them. */
+/* Islands at rest, or at rest on a belt, fall asleep: they are not solved until something touches them. */
 
 #include "core.h"
 
 /* m/s on Earth; surfaces whose velocities differ by less move alike. */
 #define ALIKE 1e-12
 
-/* Wake the island of a disk at t. Within a step its disks hop like all that lies, for what is left
-   of it: half of what gravity takes until then they get from what they lie on. */
+/* Wake the island of a disk at t. Within a step its disks then hop like all disks in contact for the rest of it: they get
+   half of the impulse by which gravity acts until its end from what they lie on. */
 void wake(int i, double t) {
     int island = W.disks[i].island;
     for (EACH_LIVE(n)) {
         Disk *d = W.disks + n;
         if (d->mode != ASLEEP || d->island != island) continue;
         double h = t - W.t, left = W.step_end - t;
-        /* Where it lies, without the hop of the step so far. */
+        /* The place at which it lies, without the hop of the step so far. */
         d->x += (d->ux - d->vx - 0.5 * W.gx * (d->t - W.t)) * (d->t - W.t);
         d->y += (d->uy - d->vy - 0.5 * W.gy * (d->t - W.t)) * (d->t - W.t);
         d->x += d->ux * (t - d->t);
@@ -41,12 +40,13 @@ void wake(int i, double t) {
     }
 }
 
-/* The velocity of the surfaces that a disk lies on is `u`, if it is to sleep; 0 if it may not. */
+/* Whether a contact allows an island to sleep. `u` is the common velocity of the surfaces that the island lies on, and is
+   set by the first one. */
 static int joins(const Contact *c, double *u, int *owner) {
     const Surface *s = W.surfaces + (-1 - c->j);
     double belt = c->other[1], x = belt * c->ny, y = -belt * c->nx;
     if (stirs(s) || (s->speed != 0 && s->shape != SEGMENT)) return 0;
-    /* Nothing has settled that a belt will throw. */
+    /* An island on a belt that will throw it off has not settled. */
     if (s->speed != 0 && W.until == UNTIL_SETTLED && c->owner != W.landing) return 0;
     if (fabs(W.gx * x + W.gy * y) > 1e-12 * W.g * fabs(belt)) return 0;
     if (*owner >= 0 && (fabs(u[0] - x) > ALIKE * W.pace || fabs(u[1] - y) > ALIKE * W.pace)) return 0;
@@ -56,8 +56,8 @@ static int joins(const Contact *c, double *u, int *owner) {
     return 1;
 }
 
-/* Let islands fall asleep that have been at rest for long enough, after a step's solve, which has left the islands
-   in `W.queue`. */
+/* Let islands fall asleep that have been at rest for long enough. This follows the solve of a step, which has left the
+   islands in `W.queue`. */
 void fall_asleep(void) {
     int ready = 0;
     for (EACH_LIVE(i)) ready |= W.disks[i].mode == FREE && W.disks[i].rest >= CALM_DOWN / W.pace;
@@ -81,7 +81,7 @@ void fall_asleep(void) {
         if (c->impulse[0] == 0 || c->two) continue;
         if (c->j >= 0 || !joins(c, W.disks[k].tugged, W.moved + k)) W.found[k]++;
     }
-    /* What rattles in its place would wake those next to it: they wait until it touches something. */
+    /* Disks that rattle in place would wake the islands next to them; these wait until such a disk touches something. */
     for (int n = 0; n < 2 * W.near_count; n++) {
         const Disk *d = W.disks + W.near[n];
         if (d->mode == FREE && !d->supports && d->rest >= CALM_DOWN / W.pace)

@@ -179,6 +179,17 @@ def sinks(recording, by):
     return change
 
 
+def meets(recording):
+    """Have one particle go where another one goes."""
+    own = slice(*recording.offsets[:2])
+
+    def change(knots):
+        there = recording.at(knots["t"][own]).position[:, -1]
+        knots["position"][own] = np.where(np.isfinite(there), there, knots["position"][own])
+
+    return change
+
+
 def late(recording, name, amount):
     """Have a quantity of each particle differ in the second half of its track."""
 
@@ -197,6 +208,7 @@ FAULTS = {
     laws.FINITE: lambda run, _: {"knots": late(run, "omega", np.nan)},
     laws.THROUGH: lambda run, _: {"knots": sinks(run, 2.0)},
     laws.INSIDE: lambda run, _: {"knots": sinks(run, 0.004)},
+    laws.APART: lambda run, _: {"knots": meets(run)},
     laws.ENERGY: lambda run, _: {"knots": late(run, "velocity", [0.0, 9.0])},
     laws.LOSSES: lambda run, play: {"knots": late(run, "entries", [0.0, -0.1 * play, 0.0])},
     laws.LEDGER: lambda run, play: {"knots": late(run, "entries", [0.0, 0.0, 1e-3 * play])},

@@ -506,3 +506,46 @@ def test_a_mass_point_that_a_blow_does_not_turn_back_is_seen(piece):
         knots["position"][later, 1] += 2.0 * blow["position"][1]
 
     assert laws.THROUGH in names(spoilt(whole, knots=mirrored))
+
+
+SIDE_BY_SIDE = {
+    "particle": [{"name": "a", "radius": 0.01}, {"name": "b", "radius": 0.02}],
+    "surface": [surface("floor", (-1.0, 0.0), (1.0, 0.0))],
+    "stream": [
+        {"at": [0.0, 0.01], "velocity": [0.0, 0.0], "interact": True, "particle": "a"},
+        {"at": [0.04, 0.02], "velocity": [0.0, 0.0], "particle": "b"},
+    ],
+    "run": {"until": 0.5},
+}
+"""Two disks that lie beside each other and do not touch."""
+
+
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+@pytest.mark.parametrize("deep", [0.049, 0.2])
+@pytest.mark.parametrize("passing", [False, True])
+def test_a_particle_inside_another_one_breaks_a_law(engine, deep, passing):
+    """Deeper than 5 % of the smaller radius, unless the two kinds pass through each other."""
+    pair = {"pair": [{"between": ["a", "b"], "meet": False}]} if passing else {}
+    run = chutelab.simulate({**SIDE_BY_SIDE, **pair}, engine=engine)
+    apart = 0.03 - deep * 0.01
+
+    def closer(knots):
+        first, last = run.offsets[1:3]
+        across = run.track(1)["position"][0] - run.track(0)["position"][0]
+        knots["position"][first:last, 0] += np.sqrt(apart**2 - across[1] ** 2) - across[0]
+
+    told = [one for one in spoilt(run, knots=closer).laws if one.law == laws.APART]
+    assert bool(told) == (deep > 0.05 and not passing)
+    for one in told:
+        assert (one.particles, one.particle) == (2, 0)
+        assert one.amount == pytest.approx(deep, abs=2e-3)
+    assert not run.laws
+
+
+def test_what_a_rod_joins_may_be_in_one_place():
+    """Particles that a rod joins do not meet."""
+    rod = {"particle": {"radius": 0.02}, "rod": [{"particle": 0, "other": 1}],
+           "stream": [{"at": [0.0, 0.0], "velocity": [0.0, 0.0], "interact": True},
+                      {"at": [0.03, 0.0], "velocity": [0.0, 0.0]}],
+           "run": {"until": 0.3}}  # fmt: skip
+    assert not chutelab.simulate(rod, engine="contact").laws

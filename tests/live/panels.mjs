@@ -38,6 +38,12 @@ const FAULTS = {
     else set(last, VX, (vx) => 1.1 * vx + 0.1);
   },
   "law-losses": ({ set, last }) => set(last, FRICTION, -1),
+  // It goes on where another one is.
+  "law-apart": ({ recording, set, last, beside }) => {
+    const there = recording.tracks[beside];
+    set(last, 1, there.at(there.count - 1, 1) + 1e-3);
+    set(last, Y, there.at(there.count - 1, Y));
+  },
   "law-solved": ({ recording }) => { recording.unsolved = 0.11; },
   "law-ledger": ({ set, last }) => set(last, VX, (vx) => 1.1 * vx + 0.1),
 };
@@ -52,7 +58,9 @@ function faultyOf({ scene, fault }) {
   };
   const touch = Array.from({ length: track.count }, (_, n) => n)
     .find((n) => track.at(n, T) >= event.t);
-  FAULTS[fault]({ recording, set, touch, last: track.count - 1, radius });
+  const ends = recording.tracks.map((one) => one.at(one.count - 1, T));
+  const beside = ends.findIndex((t, i) => i !== disk && Math.abs(t - ends[disk]) < 0.05);
+  FAULTS[fault]({ recording, set, touch, last: track.count - 1, radius, beside });
   return { laws: lawsOf(recording), disk, at: event.t };
 }
 

@@ -366,6 +366,21 @@ static void tell_hits(int passes) {
     one->piece = first->piece;
 }
 
+/* What may overlap is bound in radii of the smaller of two. Two that meet in steps that are all alike may come as late as
+   either of them at a surface. */
+static void judge_overlaps(void) {
+    double bound = L.alike ? MAX(PRESSED, 2 * L.late / All.smallest) : PRESSED;
+    Breach found = {.particle = -1};
+    find_overlaps(bound, &found);
+    if (!found.particles) return;
+    Breach *one = tell(LAW_APART, found.amount, bound);
+    one->t = found.t;
+    one->x = found.x;
+    one->y = found.y;
+    one->particles = found.particles;
+    one->particle = found.particle;
+}
+
 /* Energy. */
 
 /* The last knot of a particle at or before a time, but never the last of all; -1 if the particle isn't there then. */
@@ -588,8 +603,10 @@ EXPORT int lay_out_laws(void) {
     RESERVE(L.movers, L.mover_count);
     RESERVE(L.swings, L.swing_count);
     RESERVE(L.breaches, BREACHES);
-    RESERVE(L.order, crowd ? L.knot_count : 1);
-    RESERVE(L.places, crowd ? 2.0 * L.particle_count : 1);
+    RESERVE(L.order, crowd ? MAX(L.knot_count, L.particle_count) : L.interact ? L.particle_count : 1);
+    RESERVE(L.places, L.interact ? 2.0 * L.particle_count : 1);
+    RESERVE(L.cursors, L.interact ? L.particle_count : 1);
+    RESERVE(L.passing, L.kind_count * (double)L.kind_count);
     return has_room();
 }
 
@@ -626,6 +643,7 @@ static void judge_all(void) {
     double bound = L.energy_bound * L.energy + rounds;
     tell_hits(1);
     tell_hits(0);
+    if (L.interact) judge_overlaps();
     judge_books(bound);
     judge_steps();
 }

@@ -48,4 +48,7 @@ double swiftest(const Barrier *b, double *haste);
 void place_at(const double *knot, double share, double *x, double *y);
 int find_hits(int particle);
 
+/* overlaps.c */
+void find_overlaps(double bound, Breach *found);
+
 #endif

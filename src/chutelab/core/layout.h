@@ -737,7 +737,9 @@ typedef struct {
 /* ---- What a run is judged by: a subject of its own, which shares nothing with the engines'. ---- */
 
 /* The laws, in the order in which they are reported. */
-enum Law { LAW_FINITE, LAW_THROUGH, LAW_INSIDE, LAW_ENERGY, LAW_LOSSES, LAW_LEDGER, LAW_SOLVED, LAW_STEP };
+enum Law {
+    LAW_FINITE, LAW_THROUGH, LAW_INSIDE, LAW_APART, LAW_ENERGY, LAW_LOSSES, LAW_LEDGER, LAW_SOLVED, LAW_STEP
+};
 
 enum Engine { ENGINE_EXACT, ENGINE_CONTACT, ENGINE_PYMUNK };
 
@@ -753,7 +755,7 @@ enum Engine { ENGINE_EXACT, ENGINE_CONTACT, ENGINE_PYMUNK };
 /* Share of its radius by which a cubic between two knots may leave a circle, as the recording promises. */
 #define ON_ARCS 1e-9
 /* Greatest number of breaches that are reported; there may be two of the law of losses. */
-#define BREACHES 9
+#define BREACHES 10
 
 /* A piece of a surface for the laws. */
 typedef struct {
@@ -780,6 +782,10 @@ typedef struct {                                                                
     double mass, inertia;   /* kg, kg m2 */
     double gravity;         /* m/s2 */
     int corners, outline;   /* number of corners, 0 if it is round, and the first one in `Laws.outlines` */
+    int kind;
+    int group;              /* from 1 on, of particles that nothing holds apart; else 0 */
+    int overlaps;           /* whether it is deeper in another one than it may be */
+    int pad;
 } Body;
 
 /* A place where a particle is deeper in a piece than is allowed, or passes through it. */
@@ -813,11 +819,13 @@ typedef struct {
     double *books;          /* [in] (book_rows, 3) entries of each surface, J */
     Breach *breaches;       /* (BREACHES) */
     Hit *hits;              /* in the order of particles and knots */
-    int *order;             /* (knots) for crowds of the contact engine */
-    double *places;         /* (particles, 2) for the same */
+    int *order;             /* (knots) for crowds of the contact engine, (particles) for all crowds */
+    double *places;         /* (particles, 2) for crowds */
+    int *cursors;           /* (particles) for crowds: the knot before an instant */
+    int *passing;           /* [in] (kind_count, kind_count) whether two kinds do not meet */
     /* sizes */
     int particle_count, piece_count, knot_count, row; /* [in] row: doubles from knot to knot */
-    int mover_count, swing_count, outline_count; /* [in] */
+    int mover_count, swing_count, outline_count, kind_count; /* [in] */
     int book_rows, surface_count; /* [in] with the particles' own, which is the last */
     int hit_room;
     /* the run */

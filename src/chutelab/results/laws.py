@@ -20,13 +20,14 @@ from chutelab.results.record import EVENT, Record
 from chutelab.util.tables import number
 
 FINITE, THROUGH, INSIDE = "finite numbers", "nothing through a surface", "nothing inside a surface"
+APART = "nothing inside another particle"
 ENERGY, LOSSES, LEDGER = "energy rises only by drives", "no loss is negative", "the ledger closes"
 SOLVED, STEP = "each step is solved", "speed times step below the radius"
 
-LAWS = (FINITE, THROUGH, INSIDE, ENERGY, LOSSES, LEDGER, SOLVED, STEP)
+LAWS = (FINITE, THROUGH, INSIDE, APART, ENERGY, LOSSES, LEDGER, SOLVED, STEP)
 """Their names, in the order of reports and of the core's enum Law."""
 
-UNITS = {FINITE: "", THROUGH: "", INSIDE: "m", SOLVED: "radii", STEP: "m"}
+UNITS = {FINITE: "", THROUGH: "", INSIDE: "m", APART: "radii", SOLVED: "radii", STEP: "m"}
 """Units of the amounts found; of the others J."""
 
 INTEGER = np.dtype("<i4")
@@ -256,18 +257,21 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         sizes, outlines = np.array([len(one) for one in every]), np.concatenate(every)
         bodies["corners"] = sizes[machine.releases.kind]
         bodies["outline"] = (np.cumsum(sizes) - sizes)[machine.releases.kind]
+    bodies["kind"], bodies["group"] = machine.releases.kind, _groups(machine)
     rows = barriers(machine)
     books = recording.by_surface.reshape(-1)
     events = recording.events.view(_NUMBERS)
     unreal = sum(int(np.count_nonzero(~np.isfinite(events[name]))) for name in ("t", "rest"))
     exact = recording.engine == "exact"
+    interact = machine.interact or len(recording.swings) + len(recording.totals) > 0
+    passing = machine.pair_restitution[: None if interact else 0] < 0.0
     laws: Any = module.structs["Laws"]
     for name, value in (
         ("particle_count", count), ("piece_count", rows.shape[-1]),
         ("knot_count", len(recording.knots)),
         ("row", recording.knots.dtype.itemsize // 8), ("book_rows", len(books) // 3),
         ("surface_count", len(recording.surfaces)), ("engine", _ENGINES.index(recording.engine)),
-        ("interact", machine.interact or len(recording.swings) + len(recording.totals) > 0),
+        ("interact", interact),
         ("joined", len(machine.joints) > 0), ("alike", alike(recording)), ("each", rows.ndim > 1),
         ("pulley", machine.pulley is not None), ("contacts", recording.contacts),
         ("steps", recording.steps), ("unreal", unreal),
@@ -275,7 +279,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("mover_count", len(machine.movers)), ("swing_count", len(recording.swings)),
         ("gained", recording.gained), ("unsolved", recording.unsolved.max(initial=0.0)),
         ("largest", np.max(machine.particle.radius)), ("loose", machine.loose),
-        ("outline_count", len(outlines)),
+        ("outline_count", len(outlines)), ("kind_count", len(passing)),
     ):  # fmt: skip
         setattr(laws, name, value)
     module.work("lay_out_laws")
@@ -286,6 +290,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         row["first"], row["last"] = (own[0], own[-1]) if len(own) else (0, 0)
     module.fill(
         "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
+        passing=passing.astype(INTEGER).ravel(),
         barriers=rows.reshape(-1), books=books,
         **({"swings": recording.swings} if len(recording.swings) else {}),
         **({"angles": recording.angle, "outlines": outlines.ravel()} if len(outlines) else {}),
@@ -345,6 +350,21 @@ def barriers(machine: Machine) -> NDArray[Any]:
         for n, mover in enumerate(machine.movers, 1):
             own["mover"][part.surface == mover.surface] = n
     return rows
+
+
+def _groups(machine: Machine) -> NDArray[Any]:
+    """Return numbers, from 1 on, of groups of particles that nothing holds apart, (N,); else 0.
+
+    Those that rods and pins join, and those that the incoming belt carries by adhesion.
+    """
+    group = np.where(machine.releases.carried, machine.count + 1, 0)
+    for joint in machine.joints:
+        if joint.kind in ("rod", "pin") and joint.other >= 0:
+            ends = [joint.particle, joint.other]
+            own = group[ends].max() or joint.particle + 1
+            group[np.isin(group, [one for one in group[ends] if one])] = own
+            group[ends] = own
+    return group
 
 
 def _advice(recording: Record, law: str, figures: Any) -> str:

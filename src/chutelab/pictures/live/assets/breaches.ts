@@ -48,7 +48,7 @@ function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: R
     engine: enums.Engine.ENGINE_CONTACT,
     interact: Number(interact || states.length + joints.length > 0),
     mover_count: movers.length, swing_count: states.length, pulley: Number(!!pulley),
-    outline_count: outlines.flat().length,
+    outline_count: outlines.flat().length, kind_count: machine.pairRestitution.length,
     tilt, dt, joined: Number(joints.length > 0),
     largest: radius.reduce((most, own) => Math.max(most, own), 0), ...run,
   });
@@ -60,10 +60,12 @@ function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: R
   if (outlines.flat().length) {
     core.doubles.set(knots.filter((_, n) => n % KNOT_ROW === KNOT_ROW - 1), core.get("angles", "Laws") >> 3);
   }
+  core.ints.set(machine.pairRestitution.flat().map((e) => Number(e < 0)), core.get("passing", "Laws") >> 2);
+  const groups = groupsOf(machine);
   radius.forEach((_, i) => {
     const { kind } = machine.releases[i], outline = outlines.slice(0, kind).flat().length;
     const body = { radius: innerOf(machine, i), mass: mass[i], inertia: inertia[i], gravity,
-      corners: outlines[kind].length, outline };
+      corners: outlines[kind].length, outline, kind, group: groups[i] };
     core.fill("bodies", "Body", i, body, "Laws");
   });
   states.forEach((row, n) => core.fill("swings", "Swing", n, row, "Laws"));
@@ -86,6 +88,19 @@ const innerOf = ({ outlines, releases, radius }: Machine, i: number) =>
     return Math.min(least, (x * (v - y) - y * (u - x)) / Math.hypot(u - x, v - y));
   }, radius[i]);
 
+/** Numbers, from 1 on, of groups of particles that nothing holds apart, else 0: those that rods and pins join, and those
+ * that the incoming belt carries by adhesion. */
+function groupsOf({ joints, releases }: Machine) {
+  const group = releases.map(({ carried }) => (carried ? releases.length + 1 : 0));
+  for (const { kind, particle, other } of joints) {
+    if (!["rod", "pin"].includes(kind) || other < 0) continue;
+    const ends = [group[particle], group[other]], own = Math.max(...ends) || particle + 1;
+    group.forEach((one, i) => { if (one && ends.includes(one)) group[i] = own; });
+    group[particle] = group[other] = own;
+  }
+  return group;
+}
+
 /** All pieces of surfaces as the core's laws take them: straight ones, bent ones, the pulley. */
 function barriersOf({ segments, arcs, pulley, movers }: Machine) {
   const wheel = { x: 0, y: 0, begin: 0, extent: Infinity, appears: -Infinity, vanishes: Infinity,
@@ -101,8 +116,8 @@ function barriersOf({ segments, arcs, pulley, movers }: Machine) {
 }
 
 /** Texts of the laws, in the order of the core's enum Law. */
-const SAID = ["law-finite", "law-through", "law-inside", "law-energy", "law-losses", "law-ledger",
-  "law-solved"];
+const SAID = ["law-finite", "law-through", "law-inside", "law-apart", "law-energy", "law-losses",
+  "law-ledger", "law-solved"];
 
 /** The line below the picture about a broken law. */
 function watchLaws(line: HTMLElement, lab: Lab, words: Words) {

@@ -191,14 +191,17 @@ def test_none_waits_where_there_is_room(engine):
 
 
 def test_a_plugged_hopper_is_announced_and_one_that_runs_out_is_not():
-    # An opening of 2 diameters is bridged by three or four grains in one draw of four; 8 is not.
+    # An opening of 2 diameters is bridged by three or four grains in 5 of 16 draws; one of 8 is not.
     narrow = [
         f"surface[{i}].points=[[{x}0.1, 1.2], [{x}0.1, 0.076], [{x}0.006, 0.0]]"
         for i, x in enumerate(("-", ""))
     ]
-    stuck = printed(run("hopper", "stream.count=60", "stream.seed=2", *narrow))["plugged"]
-    assert stuck["still"] + stuck["through"] == 60
-    assert stuck["still"] > 50
+    draws = [run("hopper", "stream.count=60", f"stream.seed={n}", *narrow) for n in range(6)]
+    plugged = [one for one in (printed(draw)["plugged"] for draw in draws) if one]
+    assert plugged
+    for stuck in plugged:
+        assert stuck["still"] + stuck["through"] == 60
+        assert stuck["still"] > 50
     assert printed(run("hopper", "stream.count=60"))["plugged"] is None
 
 

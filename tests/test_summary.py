@@ -191,7 +191,7 @@ def test_none_waits_where_there_is_room(engine):
 
 
 def test_a_plugged_hopper_is_announced_and_one_that_runs_out_is_not():
-    # An opening of 2 diameters is bridged by three or four grains in 5 of 16 draws; one of 8 is not.
+    # Three or four grains bridge an opening of 2 diameters in 5 of 16 draws, and one of 8 in none.
     narrow = [
         f"surface[{i}].points=[[{x}0.1, 1.2], [{x}0.1, 0.076], [{x}0.006, 0.0]]"
         for i, x in enumerate(("-", ""))

@@ -549,3 +549,20 @@ def test_what_a_rod_joins_may_be_in_one_place():
                       {"at": [0.03, 0.0], "velocity": [0.0, 0.0]}],
            "run": {"until": 0.3}}  # fmt: skip
     assert not chutelab.simulate(rod, engine="contact").laws
+
+
+def test_what_a_crowd_gets_back_at_an_instant_is_told_as_one_sum():
+    run = chutelab.simulate("hopper", {"stream.count": 40}, engine="contact")
+    times, counts = np.unique(run.knots["t"], return_counts=True)
+    at, each = times[counts.argmax()], 1e-2 * run.ledger.turned_over
+
+    def give_back(knots):
+        for first, end in zip(run.offsets, run.offsets[1:], strict=False):
+            if at in knots["t"][first + 1 : end]:
+                now = first + 1 + np.flatnonzero(knots["t"][first + 1 : end] == at)[0]
+                knots["entries"][now:end, 1] -= each
+
+    (told,) = (one for one in spoilt(run, knots=give_back).laws if one.law == laws.LOSSES)
+    assert told.t == at
+    assert told.amount == pytest.approx(-each * told.particles, rel=0.05)
+    assert told.amount < told.bound < 0.0

@@ -501,7 +501,7 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
     for (int n = 0; n < found; n++) {
         double allowed = most + MAX(opened(worst[n].t), opened(worst[n].t - L.dt));
         if (worst[n].given >= -allowed) continue;
-        *least = bad ? MIN(*least, allowed) : allowed;
+        if (!bad) *least = allowed;
         worst[bad++] = worst[n];
     }
     return bad;
@@ -530,7 +530,7 @@ static void judge_books(double bound) {
                 for (int n = 0; n < count; n++) told |= KNOT(k)[0] == instants[n].t;
             }
             if (told) {
-                back = MIN(back, own);
+                back = crowd ? instants[0].given : MIN(back, own);
                 add(&backs, i, k);
             }
             if (L.interact) continue;

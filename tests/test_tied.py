@@ -179,6 +179,65 @@ def test_a_ball_that_swings_on_a_plate_is_of_order_two():
     assert coarse / fine == pytest.approx(4.0, rel=0.02)
 
 
+def ladder(dt):
+    """Return a ladder without weight that turns between two walls, balls at its ends outside them.
+
+    Its length L, ends at L (cos a, sin a): K = m L² w² / 2, and so a turns evenly; both are pulled
+    along the ladder by m L w², so each presses its wall, by m L w² sin a and m L w² cos a.
+    """
+    length, rate, begin = 0.5, 2.0, 0.5
+    x, y = length * cos(begin), length * sin(begin)
+    rows = [{"at": [x - R, -R], "velocity": [-y * rate, 0.0]},
+            {"at": [-R, y - R], "velocity": [0.0, x * rate]}]  # fmt: skip
+    smooth = {"friction": 0.0, "restitution": 0.0}
+    run = chutelab.simulate({
+        "particle": {"radius": R, "mass": M, "spin": False}, "gravity": 0.0,
+        "stream": [row | {"interact": True} for row in rows],
+        "rod": [{"particle": 0, "other": 1}], "run": {"until": 0.3, "dt": dt, "loads": 0.3},
+        "surface": [{"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], **smooth},
+                    {"name": "wall", "from": [0.0, -1.0], "to": [0.0, 1.0], **smooth}],
+    })  # fmt: skip
+    (x, _), (_, y) = run.ends()[1]["position"]
+    end = begin + 0.6
+    pressed = M * length * rate * np.array([cos(begin) - cos(end), sin(end) - sin(begin)])
+    on_floor, on_wall = run.impulses["force"][0]
+    assert [on_floor[1], on_wall[0]] == pytest.approx(pressed, rel=5e-3)
+    return run, atan2(y + R, x + R) - end
+
+
+def test_a_ladder_between_walls_turns_evenly_and_gets_no_energy_of_them():
+    runs = [ladder(dt) for dt in (1e-3, 5e-4)]
+    for run, _ in runs:
+        sound(run)
+        assert run.contacts == 0
+        for particle in (0, 1):
+            lost = np.diff(run.track(particle)["entries"][:, 1])
+            assert lost.min() > -1e-16
+    (_, coarse), (_, fine) = runs
+    assert abs(fine) < 1e-6
+    assert coarse / fine == pytest.approx(4.0, rel=0.01)
+
+
+@pytest.mark.parametrize("pegs", [2, 3])
+def test_a_chain_that_falls_over_pegs_gives_nothing_back(pegs):
+    """Nine or six disks on rods, rough and hardly elastic, which rattle between pegs and joints."""
+    count = {2: 9, 3: 6}[pegs]
+    meets = {"friction": 0.3, "restitution": 0.2}
+    places = np.linspace(-0.2, 0.2, pegs)
+    chain = {
+        "particle": {"shape": "disk", "radius": R, "mass": 0.05, "spin": True},
+        "stream": {"count": count, "at": [-0.3, 0.3], "to": [0.3, 0.3], "velocity": [0.0, 0.0],
+                   "interact": True, **meets},
+        "rod": [{"particle": 0, "from": [-0.35, 0.3]},
+                *({"particle": i, "other": i - 1} for i in range(1, count))],
+        "surface": [{"name": f"peg-{n}", "center": [float(x), 0.2], "radius": 0.04,
+                     "from_deg": 0.0, "to_deg": 360.0, "friction": 0.3}
+                    for n, x in enumerate(places)],
+        "run": {"until": 1.0},
+    }  # fmt: skip
+    sound(chutelab.simulate(chain, engine="contact"))
+
+
 def among_hinges(seed):
     """Return random hinges, and disks on random joints that fall on them."""
     scene, joints = drawn(seed), machine_of_joints(seed)

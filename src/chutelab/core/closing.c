@@ -65,7 +65,7 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     int i = c->i;
     double most = c->friction * c->impulse[0], slip = v[1] + c->drift;
     /* The impulses act for the second half of the last step, if the contact lasted, and the first half of this one. */
-    double past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0, span = past + 0.5 * h;
+    double past = past_of(c), span = past + 0.5 * h;
     int grips = fabs(c->impulse[1]) < most * (1 - 1e-12) || (most == 0 && slip == 0 && c->drift == 0);
     Track *track = W.tracks + i;
     if (span > 0) {
@@ -203,6 +203,23 @@ void give_in(const Contact *list, int count) {
     }
 }
 
+/* Book the ledger entries of a lasting contact, whose impulses act for half of a step of length h and for a time `past`
+   of the step before. */
+static void book_lasting(const Contact *c, double past, double h) {
+    Disk *a = W.disks + c->i, *b = c->two ? W.disks + c->j : 0;
+    double given[3] = {c->given[0], 0, 0};
+    bear_contact(c, 1, W.t - past, W.t + 0.5 * h);
+    keep_impulse(c, 1, W.t - past, W.t + 0.5 * h);
+    book(a->gain, b ? b->gain : 0, c->owner, c->entries);
+    if (c->j < 0) W.drives[c->owner] += driven(c, 0);
+    if (given[0] != 0) book(a->gain, 0, W.ride_owner, given);
+    a->ahead[0] += c->given[1];
+    for (int k = 0; k < 3; k++) {
+        a->ahead[k] += (c->two ? 0.5 : 1) * c->later[k];
+        if (c->two) b->ahead[k] += 0.5 * c->later[k];
+    }
+}
+
 /* After the solve: ledger entries, supports, timers, tracks. */
 void close_step(double h) {
     /* The share of the impulses that belongs to the step before; 0 for a new contact. */
@@ -235,11 +252,12 @@ void close_step(double h) {
         while (to < W.contact_count && (!W.interact || W.contacts[to].island == W.contacts[from].island)) to++;
         account(W.contacts + from, to - from);
         give_in(W.contacts + from, to - from);
+        leave_first_halves(W.contacts + from, to - from);
     }
     for (int n = 0; n < W.contact_count; n++) {
         Contact *c = W.contacts + n;
         Disk *a = W.disks + c->i, *b = c->j >= 0 ? W.disks + c->j : 0;
-        double u[3], v[3], way[2], given[3] = {c->given[0], 0, 0};
+        double u[3], v[3], way[2];
         c->next = a->before;
         a->before = n;
         W.links[2 * n] = a->links;
@@ -250,23 +268,14 @@ void close_step(double h) {
         }
         if (c->impulse[0] == 0 && c->clings == 0) continue;
         if (!W.interact && !a->supports) a->held_count = 0;
-        double past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0;
+        double past = past_of(c);
         if (!b && a->held_count < MAX_HELD) {
             a->held[a->held_count++] = -1 - c->j;
             note_force(a, c, past + 0.5 * h);
         }
-        bear_contact(c, 1, W.t - past, W.t + 0.5 * h);
-        keep_impulse(c, 1, W.t - past, W.t + 0.5 * h);
         relative(c, 1, u);
         relative(c, 0, v);
-        book(a->gain, c->two ? b->gain : 0, c->owner, c->entries);
-        if (!b) W.drives[c->owner] += driven(c, 0);
-        if (given[0] != 0) book(a->gain, 0, W.ride_owner, given);
-        a->ahead[0] += c->given[1];
-        for (int k = 0; k < 3; k++) {
-            a->ahead[k] += (c->two ? 0.5 : 1) * c->later[k];
-            if (c->two) b->ahead[k] += 0.5 * c->later[k];
-        }
+        if (!c->halved) book_lasting(c, past, h);
         a->supports++;
         if (b) b->supports++;
         else if (c->owner == W.landing && !a->landed && (a->on < 0 || since_passage(c, way) >= 0)) {
@@ -381,6 +390,7 @@ void take_back(int i) {
     W.push_work -= given;
     for (int link = d->links; link >= 0; link = W.links[link]) {
         const Contact *c = W.contacts + link / 2;
+        if (c->halved) continue;
         for (int n = 0; n < 3; n++) {
             double back = (c->two ? 0.5 : 1) * c->later[n];
             if (c->i != i && !c->two) back = 0;
@@ -401,11 +411,11 @@ void take_back(int i) {
 void end_in_contact(int i, int reason) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    const double *s = track->held;
+    const double *s = track->held, f = d->halved ? 0 : W.before;
     if (d->held_count)
         /* Inside an arc it is faster than its impulses make it, see `track_lasting`. */
-        bear_disk(d, W.surfaces[d->held[0]].owner, d->mass * (s[3] - d->ux - W.before * (d->vx - d->ux)),
-                  d->mass * (s[4] - d->uy - W.before * (d->vy - d->uy)), d->t, d->t);
+        bear_disk(d, W.surfaces[d->held[0]].owner, d->mass * (s[3] - d->ux - f * (d->vx - d->ux)),
+                  d->mass * (s[4] - d->uy - f * (d->vy - d->uy)), d->t, d->t);
     d->x = s[1];
     d->y = s[2];
     d->vx = s[3];

@@ -41,7 +41,7 @@ void describe(Contact *c, int i, int j) {
     double spin_mass = turn;
     c->i = i;
     c->j = j;
-    c->two = c->hung = c->cornered = 0;
+    c->two = c->hung = c->cornered = c->halved = 0;
     c->owner = W.owner_count;
     c->moved[0] = c->moved[1] = c->moved[2] = 0;
     c->mass[1] = mass + r * r * turn;

@@ -79,6 +79,8 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 #define SOON 1e-6
 /* Greatest number of contacts, with corners, that are solved to rounding, and where impacts end hops; more are a crowd. */
 #define FEW_CONTACTS 32
+/* m/s on Earth; approach velocity that the alternating solve of contacts and joints may leave. It ends at a tenth of it. */
+#define LEFT_BY_TURNS 1e-9
 /* Times `W.soft`: approach up to which two particles of a crowd with corners, of which one is supported, are left to the
    next step. */
 #define LATEST 4
@@ -177,6 +179,10 @@ double swung(const Contact *c, double f);
 static inline double driven(const Contact *c, double f) {
     double still = (1 - f) * (pressed(c) * c->moved[0] + c->impulse[1] * c->moved[1] + c->impulse[2] * c->moved[2]);
     return c->hung ? still + swung(c, f) : still;
+}
+/* Time of the step before for which a contact's impulse also acts, s. */
+static inline double past_of(const Contact *c) {
+    return c->halved || !W.tracks[c->i].lasted ? 0 : 0.5 * W.length_before;
 }
 /* Whether a particle has joints. */
 static inline int is_tied(int i) { return i >= 0 && W.disks[i].tie >= 0; }
@@ -281,8 +287,8 @@ double steered_to(const Mover *m, double t);
 int are_joined(int i, int j);
 void tie_joints(void);
 void pull_joints(double h);
-void agree_with_contacts(double h);
 double missed_by_joints(void);
+double pressed_by_joints(const Contact *c);
 void tug_all(int way);
 void drop_tugs(void);
 void forget_tugs(void);
@@ -298,6 +304,13 @@ void forget_answers(void);
 void answer_with_joints(void);
 int let_go_again(void);
 void share_with_joints(const Contact *c, double wanted, const double *u, double *J);
+
+/* tied.c */
+void agree_with_contacts(double h);
+void leave_first_halves(Contact *list, int count);
+void take_halves_back(void);
+int has_halves(void);
+void press_again(double h);
 
 /* corners.c */
 double inner_of(int i, int j);
@@ -335,6 +348,7 @@ void knot_before(int i, double t, double vx, double vy, double spin);
 void flush_track(int i);
 void track_lasting(int i);
 void track_flying(int i);
+void track_ended(int i);
 void knot_held(int i);
 void finish(int i, int reason);
 void write_event(int kind, int i, int other, int owner, double t, const double *place,

@@ -35,6 +35,8 @@
 #define HELD 1e-13
 /* Share of an impact's energy that it may gain by rounding. */
 #define GAINS 1e-12
+/* Share of a speed; a smaller approach velocity may be rounding and is no impact. */
+#define ROUNDS 1e-14
 /* Distance, in radii of the inner circle, by which two particles of a crowd may move before their places are looked up
    again; the gap is then wrong by its square. */
 #define STILL 2e-4
@@ -1038,17 +1040,18 @@ RARELY void strike_corners(int i, int j, double t) {
         const Contact *c = list + n;
         relative(c, 0, u[n]);
         fastest = MAX(fastest, -u[n][0]);
-        double rest = c->rest, approach = MAX(-u[n][0], 0), press = -opens_by(c);
+        double rest = c->rest, approach = MAX(-u[n][0], 0), drawn = pressed_by_joints(c), press = drawn - opens_by(c);
         if (c->falls * approach > 1) rest /= sqrt(sqrt(c->falls * approach));
         back[n] = rest * approach;
         int calm = j >= 0 ? approach < W.soft && (a->supports || b->supports || !two) : back[n] <= press * W.step;
+        calm |= drawn > 0 && back[n] <= drawn * W.step;
         int ends = rest < 1 && (impacts >= JAM || (impacts >= FEW && approach < SLOW * W.g * W.dt));
         if (approach > 0 && (calm || ends)) back[n] = 0;
         rests |= approach > 0 && back[n] == 0;
     }
     /* An impact that was foreseen, but does not happen, is counted, so that it is left to the next step in the end. */
     was_moved(i);
-    if (!(fastest > 0)) return;
+    if (!(fastest > ROUNDS * (fabs(a->vx) + fabs(a->vy)))) return;
     if (two) was_moved(j);
     double before[3] = {a->vx, a->vy, a->spin}, lost, normal = 0, slip = 0;
     if (answers) begin_answers();

@@ -81,6 +81,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
         sunk = gap_to(surface_at(surface, d->t), d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius;
     if (sunk) least *= HARDLY;
     least = MAX(least, d->open);
+    if (d->halved) least = MAX(least, LEFT_BY_TURNS * W.pace);
     for (int n = 0; n < d->held_count && surface >= 0 && !has_corners(d); n++) {
         if (sunk || !is_one(d, d->held[n], surface)) continue;
         double haste = hastes(surface_at(surface, d->t), d);
@@ -630,7 +631,8 @@ static void strike(int i, int j, double t) {
     }
     if (jammed || (c.rest < 1 && impacts >= FEW && -u[0] < SLOW * W.g * W.dt)) back = 0;
     const Surface *met = j < 0 ? surface_at(-1 - j, t) : 0;
-    double press = met ? press_on(a, met, c.nx, c.ny) : 0, later = 0;
+    double drawn = pressed_by_joints(&c), press = met ? press_on(a, met, c.nx, c.ny) + drawn : 0, later = 0;
+    if (!met && drawn > 0 && back <= drawn * W.step) back = 0;
     int rests = met && back <= press * MIN(W.step, turning_time(a, met));
     /* The bounces that are left out, infinitely many, would take so long, */
     if (rests && back > 0 && c.rest < 1) later = 2 * back / (press * (1 - c.rest));

@@ -21,11 +21,6 @@
 #define FINE 1e-13
 /* Share of the diagonal: a row with a smaller pivot depends on the others. */
 #define DEPENDS 1e-13
-/* Times that joints and contacts are solved for in turn; of the accuracy of the contacts. */
-#define TURNS 50
-#define AGREES 0.1
-/* m/s on Earth; what is left of that where there are FEW_CONTACTS at most. */
-#define FINE_TURNS 1e-10
 
 /* Share of the usual step; in a shorter one velocities are more exact than lengths. */
 #define BRIEF 0.1
@@ -238,21 +233,28 @@ static void pull(void) {
     }
 }
 
-/* Take half of the step's pull away from the particles, or give it to them: `way` -1 or 1. */
+/* Add (`way` 1) or subtract (-1) half of the step's pull, for all particles. In halved contacts the pull is part of the
+   step's impulses, so there only the velocity before them changes. */
 void tug_all(int way) {
-    for (int i = W.low; i < W.high; i++)
-        for (int n = 0; W.disks[i].tie >= 0 && n < 3; n++) {
-            Disk *d = W.disks + i;
-            (&d->vx)[n] += way * d->tug[n];
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        for (int n = 0; d->tie >= 0 && n < 3; n++) {
+            if (!d->halved) (&d->vx)[n] += way * d->tug[n];
             (&d->ux)[n] += way * d->tug[n];
         }
+    }
 }
 
-/* Take it away, and forget it. */
+/* Subtract it, and set it to zero. */
 void drop_tugs(void) {
-    if (!W.joint_count) return;
-    tug_all(-1);
-    for (int i = W.low; i < W.high; i++) memset(W.disks[i].tug, 0, sizeof W.disks[i].tug);
+    for (int i = W.low; i < W.high && W.joint_count; i++) {
+        Disk *d = W.disks + i;
+        for (int n = 0; d->tie >= 0 && n < 3; n++) {
+            (&d->vx)[n] -= d->tug[n];
+            (&d->ux)[n] -= d->tug[n];
+            d->tug[n] = 0;
+        }
+    }
 }
 
 /* The same at the beginning of a step, for a pull that missed and may have any size: velocities are restored. */
@@ -337,6 +339,16 @@ void pull_joints(double h) {
     pull();
     /* One that is let go since it would push, and yet gets longer, asks for a shorter step. */
     for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) missed = MAX(missed, longer(j, h) - BAND);
+}
+
+/* Acceleration by which joints press a particle on what it touches at a contact, m/s2. */
+double pressed_by_joints(const Contact *c) {
+    const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+    double press = 0;
+    if (is_tied(c->i)) press -= a->drawn[0] * c->nx + a->drawn[1] * c->ny + (c->cornered ? c->own[0] * a->drawn[2] : 0);
+    if (c->two && is_tied(c->j))
+        press += b->drawn[0] * c->nx + b->drawn[1] * c->ny - (c->cornered ? c->others[0] * b->drawn[2] : 0);
+    return press;
 }
 
 /* The instant within (0, h] at which a slack string becomes tight, INFINITY if it does not. */
@@ -429,10 +441,12 @@ void end_pull(void) {
                     : 2 / h * r[n].kick * (j->kind == PIN ? moves[n] : grows);
         if (entries[0] != 0 || entries[1] != 0) book(a->entries, b ? b->entries : 0, W.owner_count, entries);
     }
+    double hastens = h >= BRIEF * W.usual ? 2 / h : 0;
     for (int i = W.low; i < W.high; i++) {
         Disk *disk = W.disks + i;
         for (int n = 0; disk->tie >= 0 && n < 3; n++) {
             if (disk->mode == FREE) (&disk->vx)[n] += disk->tug[n];
+            if (hastens > 0) disk->drawn[n] = hastens * disk->tug[n];
             disk->tug[n] = 0;
         }
     }
@@ -691,40 +705,6 @@ int let_go_again(void) {
     }
     factor(1, 0);
     return 1;
-}
-
-/* Solve for the pull of joints and for what lasts in contact in turn, until they agree. */
-void agree_with_contacts(double h) {
-    int meets = 0;
-    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++)
-        meets |= W.disks[c->i].tie >= 0 || (c->j >= 0 && W.disks[c->j].tie >= 0);
-    for (int n = 0; n < TURNS && meets; n++) {
-        double worst = 0;
-        for (int i = W.low; i < W.high; i++) memcpy(W.disks[i].tugged, W.disks[i].tug, sizeof W.disks[i].tug);
-        pull_joints(h);
-        for (int i = W.low; i < W.high; i++)
-            for (int k = 0; k < 3 && W.disks[i].tie >= 0; k++) {
-                double more = fabs(W.disks[i].tug[k] - W.disks[i].tugged[k]);
-                worst = MAX(worst, k < 2 ? more : has_corners(W.disks + i) ? more * W.disks[i].radius : 0);
-            }
-        if (worst <= (W.contact_count > FEW_CONTACTS ? AGREES * W.accurate : FINE_TURNS * W.pace)) return;
-        for (Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
-            /* They begin anew with their impulses. */
-            const double back[3] = {-c->impulse[0], -c->impulse[1], -c->impulse[2]};
-            push(c, back);
-            for (int side = 0; side < 2; side++) {
-                const Disk *d = side ? c->two ? W.disks + c->j : 0 : W.disks + c->i;
-                if (!d || d->tie < 0) continue;
-                double more = (d->tug[0] - d->tugged[0]) * c->nx + (d->tug[1] - d->tugged[1]) * c->ny;
-                if (c->cornered) more += (side ? -c->others[0] : c->own[0]) * (d->tug[2] - d->tugged[2]);
-                c->need -= side ? -more : more;
-                c->most -= side ? -more : more;
-            }
-        }
-        solve_contacts(1);
-    }
-    /* What is pushed by hand is pulled otherwise, too. */
-    if (meets || W.pushes) pull_joints(h);
 }
 
 /* What of the lengths of joints the step misses, as a share of them. */

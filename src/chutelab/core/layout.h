@@ -110,12 +110,14 @@ typedef struct {
     int wide;                   /* 1 if all others check it in this step, see grid.c */
     int far;                    /* 1 if the step's impulses take it further than was foreseen */
     int body;               /* its row of `World.solver_bodies`, if that is of this disk */
+    int halved;             /* its contacts are, see `Contact.halved` */
     int tie;                /* first of its ends of joints, 2 n and 2 n + 1 of joint n, or -1 */
     int corners;            /* [in] number of corners; 0 if it is round ... */
     int outline;            /* [in] ... and the first of them in `World.outlines` */
     int smooth;             /* number, from 1 on, of the step in which its hop was ended */
     double inner, broad;    /* m; radius of the inner circle, and of a circle of its area; or its own */
     double tug[3], tugged[3]; /* m/s, m/s, rad/s; change by half of a step's pull of its joints, now and before */
+    double drawn[3];        /* m/s2, m/s2, rad/s2; acceleration by its joints in the latest step that was not brief */
 } Disk;
 
 /* The track of a disk since its last written knot. */
@@ -275,7 +277,7 @@ typedef struct {
     double rest, falls;     /* coefficient of restitution, and s/m for its fall with speed: see `Pair` */
     double share;           /* share of its friction that acts; below 1 where surfaces wedge a disk */
     double entries[3], later[3]; /* J; ledger entries of its impulses, and of the part of them that belongs to this
-                                    step; see `account` */
+                                    step, see `account`; of a halved contact those of its first half */
     double given[2];        /* J; the same for the belt that carries the partner */
     double turns;           /* m/s2; acceleration by which an arc turns the path of a disk in a crowd, else 0 */
     double free_gap, bend;     /* m; gap at the end of the step without impulses, and change of it by impulses beyond
@@ -286,6 +288,7 @@ typedef struct {
     int island;             /* disk at the root of its island */
     int next;               /* next of the contacts of disk i in the step before */
     int leaves;             /* it opens in this step */
+    int halved;             /* half of its impulse is given before the flight and half after it, see tied.c */
     int hung;               /* number, from 1 on, of the hinge that also gets the impulse, or 0 */
     int cornered;           /* i has corners, and perhaps j */
     double own[2], others[2]; /* m; with corners: levers of a normal and of a tangential impulse, on i and on j */

@@ -11,6 +11,8 @@ World W;
 #define MOST_AGAIN 2.0
 /* rad between knots round the pulley: a cubic through them is off by rho angle^4 / 384, 9e-10 rho. */
 #define ARC_ANGLE 0.024
+/* Greatest number of tries to find the time at which an impact cuts a step with halved contacts. */
+#define CUTS 5
 /* Greatest number of knots that an impact writes for a disk. */
 #define KNOTS_EACH 6
 
@@ -460,6 +462,7 @@ static int begin_step(void) {
         W.again = span > 0 ? MIN((W.length + h) / span, MOST_AGAIN) : 1;
         for (EACH_LIVE(i)) {
             Disk *d = W.disks + i;
+            d->halved = 0;
             if (d->mode == ASLEEP) look_ahead(i);
             if (d->mode == RIDING) ride_on(d, W.t, W.step_end);
             if (d->mode == ASLEEP) {
@@ -537,6 +540,14 @@ static void foresee_tied(void) {
         if (is_tied(i) && W.disks[i].mode == FREE) foresee(i);
 }
 
+/* Time of the first event of all particles with joints, s. */
+static double first_of_tied(void) {
+    double first = INFINITY;
+    for (int i = W.low; i < W.high; i++)
+        if (is_tied(i) && W.disks[i].mode == FREE) first = MIN(first, W.disks[i].due);
+    return first;
+}
+
 /* An impact of a particle with joints ends the step: the pull of the joints is solved anew for the shorter step, and the
    impact is resolved at the beginning of the next one, before all else. Return the disk if it had too many impacts, else
    -1. */
@@ -544,14 +555,28 @@ static int meet_tied(int i, int j, double t) {
     double soon = SOON * W.step;
     if (t > W.t + soon && t > W.step_end - soon) expect(i, INFINITY, ALARM);
     else if (t > W.t + soon) {
-        cut_step(t);
+        double end = W.step_end, next = t;
+        for (int n = 0; n < CUTS && next < end; n++) {
+            cut_step(t = next);
+            if (!has_halves()) break;
+            /* In a shorter step the pull is less, and they may meet later. */
+            W.step_end = end;
+            foresee_tied();
+            next = first_of_tied();
+            W.step_end = t;
+            if (next <= t + soon) break;
+        }
         foresee_tied();
     } else {
-        drop_tugs();
+        int anew = has_halves();
+        if (anew) {
+            take_halves_back();
+            W.step_end = W.t + soon;
+        } else drop_tugs();
         shock(i, j, W.t);
         if (W.disks[i].impacts > STALL) return i;
         cut_step(W.step_end);
-        cut_at_snaps();
+        if (!anew) cut_at_snaps();
         foresee_tied();
     }
     return -1;
@@ -618,7 +643,10 @@ static void end_step(void) {
             d->t = d->aired = W.step_end;
         }
     }
-    if (W.joint_count) end_pull();
+    if (W.joint_count) {
+        end_pull();
+        press_again(W.step_end - W.t);
+    }
     for (int i = W.low; i < W.high && W.joint_count; i++)
         if (is_tied(i) && W.disks[i].mode == FREE) {
             slow_down(i, W.step_end);

@@ -145,7 +145,7 @@ void flush_track(int i) {
 void track_lasting(int i) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    double f = W.before;
+    double f = d->halved ? 0 : W.before;
     double state[6] = {d->t, d->x, d->y, d->ux + f * (d->vx - d->ux), d->uy + f * (d->vy - d->uy),
                        d->uspin + f * (d->spin - d->uspin)};
     double entries[3];
@@ -160,11 +160,26 @@ void track_lasting(int i) {
     if (!track->lasted) knot_before(i, d->t, d->ux, d->uy, d->uspin);
     note(i, state, d->turned, entries);
     track->lasted++;
-    memcpy(track->past, track->lasted > 1 ? track->held : state, sizeof track->past);
+    if (track->lasted == 1 || track->held[0] < d->t)
+        memcpy(track->past, track->lasted > 1 ? track->held : state, sizeof track->past);
     memcpy(track->held, state, sizeof state);
     track->angles[1] = d->turned;
     memcpy(track->after, &d->vx, sizeof track->after);
     for (int n = 0; n < 3; n++) track->after_entries[n] = d->entries[n] + d->gain[n];
+}
+
+/* Note the state of a disk in lasting contact at the end of a step in which all impulses have been given. */
+void track_ended(int i) {
+    Disk *d = W.disks + i;
+    Track *track = W.tracks + i;
+    double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
+    note(i, state, d->turned, d->entries);
+    if (!track->lasted) return;
+    if (track->held[0] < d->t) memcpy(track->past, track->held, sizeof track->past);
+    memcpy(track->held, state, sizeof state);
+    track->angles[1] = d->turned;
+    memcpy(track->after, &d->vx, sizeof track->after);
+    memcpy(track->after_entries, d->entries, sizeof track->after_entries);
 }
 
 /* Note the state of a disk in flight whose path is bent by air. */

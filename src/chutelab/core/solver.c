@@ -257,7 +257,7 @@ void solve_contacts(int again) {
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
         double least = INFINITY, heaviest = 0;
-        int driven = 0, cornered = 0, tied = 0, stirred = 0;
+        int driven = 0, cornered = 0, tied = 0, stirred = 0, halved = 1;
         W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
@@ -271,6 +271,13 @@ void solve_contacts(int again) {
             stirred |= (a->supports && a->rest == 0) || (b->supports && b->rest == 0);
         }
         swings |= W.swings_too;
+        for (int n = from; n < to && !again; n++) halved &= W.contacts[n].clings == 0 && W.contacts[n].turns == 0;
+        halved &= tied && W.interact && !W.swings_too && to - from <= FEW_CONTACTS;
+        for (int n = from; n < to && !again; n++) {
+            Contact *c = W.contacts + n;
+            c->halved = W.disks[c->i].halved = halved;
+            if (c->j >= 0) W.disks[c->j].halved = halved;
+        }
         /* A drive presses with any force, so no spring would stop it. There the spring gives way by no more than what removes
            the overlap, and friction is lowered if need be. */
         for (int n = from; n < to && !again; n++) {

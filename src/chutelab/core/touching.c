@@ -120,6 +120,8 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     if (j >= 0) since = MAX(since, W.disks[j].since);
     double past = last ? 0.5 * W.length_before : MIN(MAX(W.t - since, 0), W.length_before), held = cohesion * past;
     if (cohesion > 0) parts = last ? INFINITY : MAX(parts, held / c->mass[0]);
+    /* A halved contact has no hop to fall back from. */
+    if (last && last->halved) parts = MAX(parts, LEFT_BY_TURNS * W.pace);
     if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > parts)) return 1;
     /* Cohesion keeps a gap from opening; it never closes one. */
     double aim = cohesion > 0 ? MIN(MAX(later, 0), c->gap) : 0, closed;

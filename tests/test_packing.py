@@ -124,6 +124,28 @@ def test_a_large_crowd_is_a_quarter_of_all_its_bits_and_its_laws_hold(tmp_path):
     assert off <= 2e-6 * record.radius.min()
 
 
+def test_what_units_of_entries_round_accuses_no_run():
+    """If 36 disks stop each other many entries change at one instant, each rounded to a unit."""
+    wide = 0.182
+    walls = [[-wide / 2.0, y] for y in (1.0, 0.0)]
+    drawn = {
+        "gravity": 0.0,
+        "particle": {"radius": 0.01, "mass": 0.005, "spin": True},
+        "surface": [
+            {"name": "bin", "points": [*walls, *([-x, y] for x, y in reversed(walls))],
+             "restitution": 0.0, "friction": 0.5}
+        ],
+        "stream": {"count": 36, "fill": [walls[1], [wide / 2.0, 0.3]], "velocity": [0.0, -0.8],
+                   "interact": True, "restitution": 0.0, "friction": 5.0},
+        "run": {"until": 0.5},
+    }  # fmt: skip
+    record = simulate(scene.from_dict(drawn), engine="contact")
+    told = packing.unpack(packing.pack(record, 1e-6), record.offsets, record.particle)
+    assert not record.laws
+    assert replace(record, **told | {"unit": 0.0}).laws
+    assert not replace(record, **told).laws
+
+
 def test_a_small_crowd_and_what_is_too_far_away_keep_all_bits(tmp_path):
     record = run("galton")
     assert len(record.knots) < storage.MANY

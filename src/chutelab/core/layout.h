@@ -845,6 +845,7 @@ typedef struct {
     double dt;              /* [in] s; step, 0 for the exact engine */
     double gained;          /* [in] J; by which solves broke their law of energy */
     double unsolved;        /* [in] radii; greatest overlap that the solve of a step left beyond what it asked for */
+    double unit;            /* [in] J; unit of the entries of a crowd from a file, 0: they have all bits */
     double largest;         /* [in] m; radius of the largest particle, with its corners */
     double loose;           /* [in] how much larger ON_ARCS is for this run */
     /* [out] */

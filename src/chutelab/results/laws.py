@@ -279,6 +279,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("mover_count", len(machine.movers)), ("swing_count", len(recording.swings)),
         ("gained", recording.gained), ("unsolved", recording.unsolved.max(initial=0.0)),
         ("largest", np.max(machine.particle.radius)), ("loose", machine.loose),
+        ("unit", recording.unit),
         ("outline_count", len(outlines)), ("kind_count", len(passing)),
     ):  # fmt: skip
         setattr(laws, name, value)

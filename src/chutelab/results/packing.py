@@ -372,10 +372,8 @@ def pack(record: Record, tolerance: float) -> dict[str, NDArray[Any]]:
     return packed | write(told)
 
 
-def unpack(
-    packed: dict[str, NDArray[Any]], offsets: Ints, particle: Particle
-) -> dict[str, NDArray[Any]]:
-    """Return the knots, angles and events given to `pack`, within its tolerance."""
+def unpack(packed: dict[str, NDArray[Any]], offsets: Ints, particle: Particle) -> dict[str, Any]:
+    """Return the knots, angles and events given to `pack`, within its tolerance, and the `unit`."""
     reader = Reader(packed["sizes"], packed["bits"])
     tracks = Tracks.of(packed, offsets, reader.read)
 
@@ -387,4 +385,5 @@ def unpack(
         tracks.events[name][part] = values
     if len(reader.sizes) or len(reader.bits):
         raise ValueError("too many numbers")
-    return {"knots": tracks.knots, "angle": tracks.angle, "events": tracks.events}
+    unit = float(packed["units"][3])
+    return {"knots": tracks.knots, "angle": tracks.angle, "events": tracks.events, "unit": unit}

@@ -295,6 +295,9 @@ class Record(Shown):
     unsolved : ndarray, shape (S,) or (0,)
         How well each of these steps was solved: the largest overlap, in radii, left beyond what was
         asked for. A solve ends when this is small, or after a number of sweeps.
+    unit : float
+        Unit (J) in which the entries of a crowd were saved, if it comes from a file; 0: they have
+        all bits. The laws allow for what it rounds.
     drives : ndarray, shape (len(surfaces),) or (0,)
         The part of the belt work (J) in `by_surface`, in the knots and in `totals` that is the work
         of a surface's drive, see docs/physics.md, "Moving surfaces". Empty if none moves.
@@ -335,6 +338,7 @@ class Record(Shown):
     air_loss: float = 0.0
     totals: NDArray[Any] = field(default_factory=lambda: np.empty(0, TOTAL))
     unsolved: Floats = field(default_factory=lambda: np.empty(0))
+    unit: float = 0.0
     drives: Floats = field(default_factory=lambda: np.zeros(0))
     impulses: NDArray[Any] = field(default_factory=lambda: np.empty((0, 0), LOAD))
     lasting: NDArray[Any] = field(default_factory=lambda: np.empty(0, LASTING))

@@ -334,6 +334,23 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
 
 double inner_of(int i, int j) { return j < 0 ? W.disks[i].inner : MIN(W.disks[i].inner, W.disks[j].inner); }
 
+/* Whether two polygons overlap, after `are_apart` has found the edges that separate them most. */
+static int overlap(const Shape *a, const Shape *b) {
+    return clear_of(a, a->facing, b) < 0 && clear_of(b, b->facing, a) < 0;
+}
+
+/* The place of two polygons that overlap although no corner is inside the other one: a tip has passed through a tip, and
+   only edges cross. It is the deepest corner at the edge that separates them most. */
+static void find_crossing(const Shape *a, const Shape *b, Touch *t) {
+    int own = clear_of(a, a->facing, b) >= clear_of(b, b->facing, a), deepest = 0;
+    const Shape *edge = own ? a : b, *other = own ? b : a;
+    for (int n = 1; n < other->count; n++)
+        if (off_edge(edge, edge->facing, other->p[n]) < off_edge(edge, edge->facing, other->p[deepest])) deepest = n;
+    t->which = own ? a->count + deepest : deepest;
+    t->on = edge->facing;
+    fill_in(a, b, t);
+}
+
 /* List the places at which a polygon and another shape have a gap below `within`, up to MOST_TOUCHES. */
 static int list_places_of(Shape *a, Shape *b, double near, double within, Touch *list) {
     int count = 0, both = !b->s && b->round < 0;
@@ -357,6 +374,7 @@ static int list_places_of(Shape *a, Shape *b, double near, double within, Touch 
         }
         count += !known;
     }
+    if (!count && both && overlap(a, b)) find_crossing(a, b, list + count++);
     for (int n = 0; n < count; n++) list[n].many = count;
     return count;
 }
@@ -555,13 +573,14 @@ static double rolls_at(int i, int j, double low, double high, double soft) {
 double meet_corners(int i, int j, double from, double until, double most, double soft) {
     double span = until - from, small = inner_of(i, j), near = TOUCH * small;
     double h = 0, first = INFINITY, gap[CANDIDATES];
-    int sides[MOST_CORNERS], in_reach[CANDIDATES], many = 0, closed = 0;
+    int sides[MOST_CORNERS], in_reach[CANDIDATES], many = 0, closed;
     if (!(span > 0) || most <= soft) return INFINITY;
     Shape a = shape_of(i, from), b = shape_of(j, from);
     int count = a.count + b.count, on_segment = b.s && b.s->shape == SEGMENT, both = !b.s && b.round < 0;
     double turn = both ? fabs(W.disks[i].spin) + fabs(W.disks[j].spin) : 0;
     double bends = turn * (2 * most + 4 * turn * MAX(W.disks[i].radius, both ? W.disks[j].radius : 0));
     if (are_apart(&a, &b, most * span + near)) return INFINITY;
+    closed = both && overlap(&a, &b);
     /* On something round all corners are one candidate: when one leaves, the next may arrive. */
     int rolls = b.round >= 0 && span * (fabs(W.disks[i].spin) + (j < 0 ? 0 : fabs(W.disks[j].spin))) > ROLLS;
     for (int c = 0; c < count; c++) {

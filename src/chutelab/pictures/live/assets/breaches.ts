@@ -88,8 +88,8 @@ const innerOf = ({ outlines, releases, radius }: Machine, i: number) =>
     return Math.min(least, (x * (v - y) - y * (u - x)) / Math.hypot(u - x, v - y));
   }, radius[i]);
 
-/** Numbers, from 1 on, of groups of particles that nothing holds apart, else 0: those that rods and pins join, and those
- * that the incoming belt carries by adhesion. */
+/** Numbers, from 1 on, of groups of particles that nothing holds apart, else 0: those that rods and
+ * pins join, and those that the incoming belt carries by adhesion. */
 function groupsOf({ joints, releases }: Machine) {
   const group = releases.map(({ carried }) => (carried ? releases.length + 1 : 0));
   for (const { kind, particle, other } of joints) {

@@ -307,6 +307,7 @@ void share_with_joints(const Contact *c, double wanted, const double *u, double 
 
 /* tied.c */
 void agree_with_contacts(double h);
+void mark_halved(void);
 void leave_first_halves(Contact *list, int count);
 void take_halves_back(void);
 int has_halves(void);

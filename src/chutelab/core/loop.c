@@ -514,6 +514,7 @@ static int begin_step(void) {
     if (W.contact_count) solve_contacts(0);
     if (W.joint_count) {
         agree_with_contacts(h);
+        mark_halved();
         W.unsolved = MAX(W.unsolved, missed_by_joints());
     }
     W.unsolved_most = MAX(W.unsolved_most, W.unsolved);

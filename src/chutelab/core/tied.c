@@ -50,6 +50,16 @@ void agree_with_contacts(double h) {
     if (meets || W.pushes) pull_joints(h);
 }
 
+/* Mark the particles that a halved contact presses; those that only touch go on like others with joints. */
+void mark_halved(void) {
+    for (EACH_LIVE(i)) W.disks[i].halved = 0;
+    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
+        if (!c->halved || c->impulse[0] == 0) continue;
+        W.disks[c->i].halved = 1;
+        if (c->j >= 0) W.disks[c->j].halved = 1;
+    }
+}
+
 /* Half of the work of a contact's impulse by the velocity change of the first half of the pull, J. */
 static double against_pull(const Contact *c) {
     const double *J = c->impulse, x = J[0] * c->nx + J[1] * c->ny, y = J[0] * c->ny - J[1] * c->nx;

@@ -1,4 +1,4 @@
-/* Loads on surfaces in the contact engine: from impacts, lasting contacts, sleepers and riders. */
+/* What surfaces bear in the contact engine: of blows, of contacts that last, under what sleeps and rides. */
 
 #include "core.h"
 
@@ -7,24 +7,27 @@ static Push at_foot(const Disk *d, int owner, double depth, double nx, double ny
                    .nx = nx, .ny = ny };
 }
 
-/* The same for the belt below a rider. */
+/* The same below a rider, on the belt. */
 static Push on_belt(const Disk *d, double from, double to) {
     double phi = MAX(d->ride_x + d->ride_speed * (0.5 * (from + to) - d->ride_from), 0) / d->ride_rho - W.ride_incline;
     double depth = d->ride_rho - (W.pulley < 0 ? 0 : W.surfaces[W.pulley].radius);
     return at_foot(d, W.ride_owner, depth, sin(phi), cos(phi), from, to);
 }
 
-/* The impulse of a contact on disk i, N s. */
+/* The impulse on disk i of a contact, N s. */
 static void impulse_of(const Contact *c, double share, double *J) {
     J[0] = share * (pressed(c) * c->nx + c->impulse[1] * c->ny);
     J[1] = share * (pressed(c) * c->ny - c->impulse[1] * c->nx);
 }
 
-/* Report the load by a contact of disk i with a surface, or with a rider: then the belt of the rider bears it. */
+/* What a sleeper gets is told of by `tell_frozen`. */
+static int is_on_sleeper(const Contact *c) { return sleeps(c->j); }
+
+/* Tell of the impulse on disk i of a contact with a surface, or with a rider, whose belt bears it. */
 void bear_contact(const Contact *c, double share, double from, double to) {
     const Disk *a = W.disks + c->i;
     double J[2];
-    if (B.every == 0 || c->two) return;
+    if (B.every == 0 || c->two || is_on_sleeper(c)) return;
     Push p = c->j < 0 ? at_foot(a, c->owner, c->cornered ? c->own[1] : a->radius, c->nx, c->ny, from, to)
                       : on_belt(W.disks + c->j, from, to);
     if (c->cornered && c->j < 0) {
@@ -38,14 +41,14 @@ void bear_contact(const Contact *c, double share, double from, double to) {
     bear(&p);
 }
 
-/* Record the impulse of a surface on a disk, from its foot on the surface. */
+/* Keep what surfaces gave by a push, from the foot below a disk. */
 static void keep_push(const Disk *d, const Push *p, double depth) {
     double J[] = {p->jx, p->jy}, b[] = {depth * p->nx, depth * p->ny};
     keep_contact((int)(d - W.disks), -1 - p->owner, p->from, p->to, J, b);
 }
 
-/* The vector to the centre of disk i from that of its partner, or from its foot on a surface, m. */
-static void branch_of(const Contact *c, double *b) {
+/* What disk i of a contact is off the other, or off its foot on a surface, m. */
+void branch_of(const Contact *c, double *b) {
     const Disk *a = W.disks + c->i, *other = W.disks + MAX(c->j, 0);
     b[0] = c->j < 0 ? a->radius * c->nx : a->x - other->x;
     b[1] = c->j < 0 ? a->radius * c->ny : a->y - other->y;
@@ -56,7 +59,7 @@ static void branch_of(const Contact *c, double *b) {
 
 static int other_of(const Contact *c) { return c->j < 0 ? -1 - c->owner : c->j; }
 
-/* Record the impulse of a lasting contact for its pair. Impacts are events instead. */
+/* The same, kept pair by pair. Blows are events instead. */
 void keep_impulse(const Contact *c, double share, double from, double to) {
     double J[2], b[2];
     if (B.each == 0) return;
@@ -66,10 +69,10 @@ void keep_impulse(const Contact *c, double share, double from, double to) {
     keep_carried(c, share, from, to);
 }
 
-/* Record that the belt gives a rider what a contact takes from it, also in an impact, as its path doesn't change. */
+/* What a contact takes from a rider its belt gives it, of a blow too: the rider's way stays as it is. */
 void keep_carried(const Contact *c, double share, double from, double to) {
     double J[2];
-    if (B.each == 0 || c->j < 0 || c->two) return;
+    if (B.each == 0 || c->j < 0 || c->two || is_on_sleeper(c)) return;
     impulse_of(c, share, J);
     Push p = on_belt(W.disks + c->j, from, to);
     p.jx = J[0];
@@ -77,14 +80,14 @@ void keep_carried(const Contact *c, double share, double from, double to) {
     keep_push(W.disks + c->j, &p, W.disks[c->j].radius);
 }
 
-/* Distance of the foot of a disk on a surface from its centre, m, and the normal there. The place at which a particle
-   with corners is supported isn't known here: its foot is taken below its centre. */
+/* How far the foot of a disk on a surface is from its centre, m, and the normal there. What has corners is borne
+   below its centre, as far as that is told. */
 static double depth_of(const Disk *d, const Surface *s, double *nx, double *ny) {
     double gap = gap_to(s, d->x, d->y, d->radius, nx, ny);
     return has_corners(d) ? gap + d->radius : d->radius;
 }
 
-/* Report an impulse on a disk from the surface that it lies on, or that supports its island. */
+/* Tell of an impulse on a disk that the surface which it lies on, or one that bears its island, gives. */
 void bear_disk(const Disk *d, int owner, double jx, double jy, double from, double to) {
     double nx = 0, ny = 1, depth = d->radius;
     if ((B.every == 0 && B.each == 0) || (jx == 0 && jy == 0)) return;
@@ -97,8 +100,8 @@ void bear_disk(const Disk *d, int owner, double jx, double jy, double from, doub
     if (B.each > 0) keep_push(d, &p, depth);
 }
 
-/* Report the load by a ride since the last knot, up to the present place: the belt gives the change of the velocity and
-   what gravity takes. */
+/* Tell of a ride since the last knot, up to where the disk is now: the belt gives what changes its
+   velocity and what gravity would. */
 void bear_ride(int i) {
     const Disk *d = W.disks + i;
     const double *last = W.tracks[i].knot;
@@ -115,132 +118,160 @@ void bear_ride(int i) {
     if (B.each > 0) keep_push(d, &p, d->radius);
 }
 
-/* Note the force with which the last surface of `held` supported a disk in a step. */
-void note_force(Disk *d, const Contact *c, double span) {
-    double *force = d->bears + 2 * (d->held_count - 1);
-    force[0] = (pressed(c) * c->nx + c->impulse[1] * c->ny) / span;
-    force[1] = (pressed(c) * c->ny - c->impulse[1] * c->nx) / span;
-}
-
-/* Report the loads by a sleeper since it fell asleep, and for the time `more` at the end. */
-void bear_asleep(const Disk *d, double until, double more) {
-    if (B.each > 0) keep_awake((int)(d - W.disks), until, until - d->slept + more);
-    for (int n = 0; n < d->held_count && B.every > 0; n++) {
-        double nx, ny, time = until - d->slept + more;
-        const Surface *s = W.surfaces + d->held[n];
-        double depth = depth_of(d, s, &nx, &ny);
-        Push p = at_foot(d, s->owner, depth, nx, ny, d->slept, until);
+/* Tell that what was frozen holds both no more from t on. */
+void melt(Frozen *f, double t) {
+    double time = t - f->from, J[2] = {time * (f->force[0] + f->more[0]), time * (f->force[1] + f->more[1])};
+    const Disk *d = W.disks + f->i, *first = W.disks + f->first;
+    if (f->from == INFINITY) return;
+    f->from = INFINITY;
+    if (B.each > 0) keep_contact(f->i, f->j < 0 ? -1 - W.surfaces[-1 - f->j].owner : f->j, t - time, t, J, f->branch);
+    if (B.every > 0 && f->j < 0) {
+        const Surface *s = W.surfaces + (-1 - f->j);
+        double nx, ny, way = d->t - (t - time);
+        gap_to(s, d->x, d->y, d->radius, &nx, &ny);
+        Push p = at_foot(d, s->owner, 0, nx, ny, t - time, t);
         p.vx = d->ux;
         p.vy = d->uy;
-        p.x -= d->ux * (d->t - d->slept);
-        p.y -= d->uy * (d->t - d->slept);
-        p.jx = d->bears[2 * n] * time;
-        p.jy = d->bears[2 * n + 1] * time;
+        p.x -= f->branch[0] + d->ux * way;
+        p.y -= f->branch[1] + d->uy * way;
+        p.jx = J[0];
+        p.jy = J[1];
         bear(&p);
     }
+    time = f->first == f->i ? -time : time;
+    if (f->j >= 0) bear_disk(first, first->bearer, time * f->more[0], time * f->more[1], t - fabs(time), t);
 }
 
-/* Correct the forces on islands that have just fallen asleep so that they bear the weight: the difference, an error of
-   the solve, is distributed over all forces in proportion to their size. `W.queue` leads to the roots of islands. */
-void balance_sleepers(void) {
-    for (int i = W.low; i < W.high && B.every > 0; i++) {
-        if (W.disks[i].mode != ASLEEP || W.disks[i].slept != W.t || island_of(i) != i) continue;
-        double x = 0, y = 0, size = 0;
-        for (int pass = 0; pass < 2; pass++)
-            for (int n = W.low; n < W.high; n++) {
-                Disk *d = W.disks + n;
-                if (d->mode != ASLEEP || d->slept != W.t || d->island != i) continue;
-                if (pass == 0) x -= d->mass * W.gx, y -= d->mass * W.gy;
-                for (double *f = d->bears; f < d->bears + 2 * d->held_count; f += 2) {
-                    double strong = sqrt(square(f[0]) + square(f[1]));
-                    if (pass == 0) x -= f[0], y -= f[1], size += strong;
-                    else f[0] += x * strong / size, f[1] += y * strong / size;
-                }
-            }
+/* Tell up to when a sleeper has got the impulse J from what is awake, J on i of the two: what it did not count on, what
+   bears it takes. */
+void tell_frozen(Frozen *f, int sleeper, const double *J, double to) {
+    const Disk *d = W.disks + sleeper;
+    double time = to - f->told, sign = sleeper == f->j ? 1 : -1;
+    bear_disk(d, d->bearer, sign * (J[0] - f->force[0] * time), sign * (J[1] - f->force[1] * time), MIN(f->told, to), MAX(f->told, to));
+    f->told = to;
+}
+
+/* Rounds of conjugate gradients, and the share of weight that they may leave. */
+#define ROUNDS 1000
+#define BALANCED 1e-12
+/* Of what a smooth surface gives along its normal, what it may give across. */
+#define SMOOTH 1e-4
+
+enum { LEFT, AHEAD, CHANGE, RAISED };
+
+/* One of the four vectors of a disk. */
+static double *of(int disk, int which) { return W.balance + 8 * disk + 2 * which; }
+
+/* Whether a disk is balanced now: it has just fallen asleep, or all that it hangs together with sleeps. */
+static int is_new(int i) { return sleeps(i) && W.disks[i].balanced == W.t; }
+
+/* What a frozen contact gives more if its disks differ by so much: in proportion to its strength, and on a smooth surface
+   hardly but along its normal. */
+static void give_more(const Frozen *f, int which, double *given) {
+    double force[2], more[2], strong = 0, along = 0;
+    double across = f->j < 0 && surface_pair(W.disks + f->i, -1 - f->j)->friction == 0 ? SMOOTH : 1;
+    for (int n = 0; n < 2; n++) {
+        force[n] = f->force[n] + f->more[n];
+        more[n] = of(f->i, which)[n] - (f->j < 0 ? 0 : of(f->j, which)[n]);
+        strong += square(force[n]);
+        along += force[n] * more[n];
+    }
+    for (int n = 0; n < 2; n++) given[n] = across * strong * more[n] + (1 - across) * along * force[n];
+}
+
+/* Add up at disks what contacts give more of `which` into `to`. */
+static void add_raised(int which, int to) {
+    double given[2];
+    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
+        if (f->from != W.t) continue;
+        give_more(f, which, given);
+        for (int n = 0; n < 2; n++) {
+            of(f->i, to)[n] += given[n];
+            if (f->j >= 0) of(f->j, to)[n] -= given[n];
+        }
     }
 }
 
-/* Greatest number of rounds of conjugate gradients, and the share of the weight that they may leave unbalanced. */
-#define ROUNDS 200
-#define BALANCED 1e-12
-
-enum { RESIDUAL, DIRECTION, SOLUTION, PRODUCT };
-
-/* One of the four vectors of conjugate gradients, at a disk. */
-static double *vector_of(int disk, int which) { return B.balance + 8 * disk + 2 * which; }
-
-/* Multiply a vector by the Laplacian of the net of contacts, and add the product to another one. */
-static void multiply(const Lasting *rows, int count, int which, int to) {
-    for (const Lasting *c = rows; c < rows + count; c++)
-        for (int n = 0; n < 2; n++) {
-            double more = vector_of(c->disk, which)[n] - (c->other < 0 ? 0 : vector_of(c->other, which)[n]);
-            vector_of(c->disk, to)[n] += more;
-            if (c->other >= 0) vector_of(c->other, to)[n] -= more;
-        }
+/* Set a vector to 0 where nothing is balanced; return the sum of the squares of the rest. */
+static double square_of(int which) {
+    double sum = 0;
+    for (int i = W.low; i < W.high; i++)
+        for (int n = 0; n < 2; n++) sum += square(of(i, which)[n] *= is_new(i));
+    return sum;
 }
 
-/* Change the forces of contacts as little as possible so that they bear the weight of all sleepers; what they miss is the
-   error of the solve. The change of a force is the difference of a potential at its two disks, and the Laplacian of the
-   potential on the net of contacts is the missing weight. Conjugate gradients find the potential. */
-static void balance_contacts(Lasting *rows, int count) {
-    double size = 0, weight = 0;
+/* Begin anew with what hangs together and sleeps now as a whole, after a part of it did: all that it is held by is
+   balanced once more. */
+static void begin_whole(void) {
+    int *parent = W.queue, *open = W.found;
+    for (EACH_LIVE(i)) {
+        parent[i] = i;
+        open[i] = 0;
+    }
+    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++)
+        if (f->j >= 0 && f->from < INFINITY) parent[island_of(f->i)] = island_of(f->j);
+    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++)
+        if (f->from == INFINITY) open[island_of(W.disks[f->i].mode == ASLEEP ? f->i : f->j)] = 1;
+    for (EACH_LIVE(i))
+        if (is_new(i)) open[island_of(i)] |= 2;
+    for (Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
+        if (f->from == INFINITY || open[island_of(f->i)] != 2) continue;
+        melt(f, W.t);
+        f->from = W.t;
+        for (int n = 0; n < 2; n++) f->force[n] += f->more[n], f->more[n] = 0;
+    }
+    for (EACH_LIVE(i))
+        if (W.disks[i].mode == ASLEEP && open[island_of(i)] == 2) W.disks[i].balanced = W.t;
+}
+
+/* Change the forces of what has just been frozen by the least that has them bear the weight of those that fell asleep:
+   what the forces of the latest step are off it is a solve's rest. The change is a difference of what disks have, a
+   potential, whose Laplacian on the net of contacts is what weight lacks. */
+void balance_sleepers(void) {
+    begin_whole();
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
-        int sleeps = d->mode == ASLEEP && d->slept == W.t;
-        for (int n = 0; n < 8; n++) vector_of(i, 0)[n] = 0;
-        vector_of(i, RESIDUAL)[0] = sleeps ? -d->mass * W.gx : 0;
-        vector_of(i, RESIDUAL)[1] = sleeps ? -d->mass * W.gy : 0;
-        for (int n = 0; n < 2; n++) weight += square(vector_of(i, RESIDUAL)[n]);
+        for (int n = 0; n < 8; n++) of(i, 0)[n] = 0;
+        of(i, LEFT)[0] = -d->mass * W.gx;
+        of(i, LEFT)[1] = -d->mass * W.gy;
     }
-    for (const Lasting *c = rows; c < rows + count; c++)
-        for (int n = 0; n < 2; n++) {
-            vector_of(c->disk, RESIDUAL)[n] -= (&c->x)[n];
-            if (c->other >= 0) vector_of(c->other, RESIDUAL)[n] += (&c->x)[n];
+    double weight = square_of(LEFT);
+    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++)
+        for (int n = 0; n < 2 && (f->from == W.t || f->from == INFINITY); n++) {
+            double force = f->force[n] + (f->from == W.t ? f->more[n] : 0);
+            of(f->i, LEFT)[n] -= force;
+            if (f->j >= 0) of(f->j, LEFT)[n] += force;
         }
+    double size = square_of(LEFT);
     for (int i = W.low; i < W.high; i++)
-        for (int n = 0; n < 2; n++) {
-            vector_of(i, DIRECTION)[n] = vector_of(i, RESIDUAL)[n];
-            size += square(vector_of(i, RESIDUAL)[n]);
-        }
+        for (int n = 0; n < 2; n++) of(i, AHEAD)[n] = of(i, LEFT)[n];
     for (int round = 0; round < ROUNDS && size > square(BALANCED) * weight; round++) {
-        double along = 0, now = 0;
-        for (int i = W.low; i < W.high; i++) vector_of(i, PRODUCT)[0] = vector_of(i, PRODUCT)[1] = 0;
-        multiply(rows, count, DIRECTION, PRODUCT);
+        double along = 0, now;
+        for (int i = W.low; i < W.high; i++) of(i, RAISED)[0] = of(i, RAISED)[1] = 0;
+        add_raised(AHEAD, RAISED);
+        square_of(RAISED);
         for (int i = W.low; i < W.high; i++)
-            for (int n = 0; n < 2; n++) along += vector_of(i, DIRECTION)[n] * vector_of(i, PRODUCT)[n];
+            for (int n = 0; n < 2; n++) along += of(i, AHEAD)[n] * of(i, RAISED)[n];
         if (!(along > 0)) break;
         for (int i = W.low; i < W.high; i++)
             for (int n = 0; n < 2; n++) {
-                vector_of(i, SOLUTION)[n] += size / along * vector_of(i, DIRECTION)[n];
-                vector_of(i, RESIDUAL)[n] -= size / along * vector_of(i, PRODUCT)[n];
-                now += square(vector_of(i, RESIDUAL)[n]);
+                of(i, CHANGE)[n] += size / along * of(i, AHEAD)[n];
+                of(i, LEFT)[n] -= size / along * of(i, RAISED)[n];
             }
+        now = square_of(LEFT);
         for (int i = W.low; i < W.high; i++)
-            for (int n = 0; n < 2; n++)
-                vector_of(i, DIRECTION)[n] = vector_of(i, RESIDUAL)[n] + now / size * vector_of(i, DIRECTION)[n];
+            for (int n = 0; n < 2; n++) of(i, AHEAD)[n] = of(i, LEFT)[n] + now / size * of(i, AHEAD)[n];
         size = now;
     }
-    for (Lasting *c = rows; c < rows + count; c++) {
-        double *force = &c->x, strong = square(force[0]) + square(force[1]), b[2];
-        for (int n = 0; n < 2; n++) b[n] = (force[0] * c->stress[n] + force[1] * c->stress[2 + n]) / strong;
+    for (Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
+        double given[2];
+        if (f->from != W.t) continue;
+        give_more(f, CHANGE, given);
         for (int n = 0; n < 2; n++) {
-            force[n] += vector_of(c->disk, SOLUTION)[n] - (c->other < 0 ? 0 : vector_of(c->other, SOLUTION)[n]);
-            for (int k = 0; k < 2; k++) c->stress[2 * n + k] = force[n] * b[k];
+            f->more[n] += given[n];
+            if (f->j >= 0 && !(is_new(f->i) && is_new(f->j))) continue;
+            f->force[n] += f->more[n];
+            f->more[n] = 0;
         }
     }
-}
-
-/* Keep the forces that hold what has just fallen asleep: those of its latest step, balanced. */
-void keep_sleepers(void) {
-    int first = B.asleep_count;
-    for (int n = 0; n < W.contact_count && B.each > 0; n++) {
-        const Contact *c = W.contacts + n;
-        const Disk *d = W.disks + c->i;
-        double force[2], b[2];
-        if (d->mode != ASLEEP || d->slept != W.t || (c->impulse[0] == 0 && c->clings == 0)) continue;
-        impulse_of(c, 2 / (W.length_before + W.length), force);
-        branch_of(c, b);
-        keep_asleep(c->i, other_of(c), d->slept, force, b);
-    }
-    if (B.asleep_count > first) balance_contacts(B.asleep + first, B.asleep_count - first);
 }

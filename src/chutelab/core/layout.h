@@ -70,13 +70,15 @@ typedef struct {
     double ride_speed;          /* m/s */
     double ride_from, ride_to;  /* s; when the ride began and ends */
     double exit_box[4];         /* [in] m; left, bottom, right, top; its track ends outside */
-    double zone[4];             /* the box with a margin, for which `World.nearby` is right */
-    double since;               /* s; time of the latest impact */
-    double slept;               /* s; time at which it fell asleep */
-    double calm;                /* s; for how long its contacts have hardly slipped or opened */
-    double open;                /* m/s; approach that a solve leaves open for disks in contact with a rider, see `give_in` */
-    double rest;                /* s; for how long it has been at rest: calm by the lower bound for sleep, or staying in
-                                   place even if it rattles there */
+    double zone[4];             /* the box, and room round it, for which `World.nearby` is right */
+    double since;               /* s; latest impact */
+    double slept;               /* s; since when it is asleep ... */
+    double balanced;            /* ... and what holds it is balanced to its weight */
+    double calm;                /* s; since when nothing at its contacts slips or moves apart */
+    double open;                /* m/s; what the solve leaves open where a belt carries one of those in touch, see `give_in` */
+    double rest;                /* s; since when it is at rest: the same to the finer bound of falling asleep,
+                                   or it stays where it is, however it rattles there */
+    double waits;               /* s; so long it has to be at rest to fall asleep */
     double anchor[3];           /* m; where its rest began: x, y, and how far its rim has turned since */
     int stirred;                /* whether a contact slips or opens in this step */
     double entries[3];          /* J; belt work, restitution loss, friction loss so far */
@@ -95,11 +97,12 @@ typedef struct {
     int before;                 /* first of its contacts of the step before, or -1 */
     int queued, moved, jam;     /* marks: of the shock, twice, and of the latest jam */
     int jam_next;               /* the next disk in that jam, or -1 */
-    int island;
-    int nearby_count;           /* surfaces whose boxes overlap its zone; MAX_NEARBY + 1: too many */
+    int bearer;                 /* of a sleeper: owner of a surface that bears it */
+    int frozen;                 /* first of its ends of `World.frozen`, or -1 */
+    int rouses;                 /* the next that wakes with it, or -1 */
+    int nearby_count;           /* surfaces whose boxes meet its zone; MAX_NEARBY + 1: too many */
     int held_count;
-    int held[MAX_HELD];         /* surfaces that it lies on ... */
-    double bears[8];            /* N; ... and their forces on it in the latest step, x and y of each */
+    int held[MAX_HELD];         /* surfaces it lies on */
     int ride_met;               /* surface where a ride ends, or -1 */
     int on;                     /* owner of a surface that it lies on, or -1 */
     int slips;                  /* whether it slips there */
@@ -283,19 +286,34 @@ typedef struct {
     int i, j;
     int two;                /* whether j is a free disk, which also gets the impulse */
     int owner;              /* of the ledger entries */
-    int island;             /* disk at the root of its island */
-    int next;               /* next of the contacts of disk i in the step before */
-    int leaves;             /* it opens in this step */
-    int hung;               /* number, from 1 on, of the hinge that also gets the impulse, or 0 */
+    int island;             /* a disk by which it is known */
+    int next;               /* of the contacts of disk i in the step before */
+    int frozen;             /* number of the frozen contact that it was, or that a sleeper counts on, from 1 on, or 0 */
+    int leaves;             /* it parts in this step */
+    int hung;               /* number of the hinge that feels the impulse from 1 on, or 0 */
     int cornered;           /* i has corners, and perhaps j */
-    double own[2], others[2]; /* m; with corners: levers of a normal and of a tangential impulse, on i and on j */
-    double spot[2];         /* m; ... and the place from the centre of i, in the frame of i */
-    double looked[7];       /* m, rad; when the place was looked up: the gap, and x, y and `turned` of i and of j */
-    int places, pad;        /* number of places at which the two touched then */
+    double own[2], others[2]; /* m; of what has corners: levers of a normal and of a tangential impulse, on i and on j */
+    double spot[2];         /* m; ... and the place from the centre of i, as that is turned */
+    double looked[7];       /* m, rad; as the place was looked up: the gap, and x, y and `turned` of i and of j */
+    int places, pad;        /* at which the two touched then */
+    double mean[2];         /* N; what it has given i of late, see sleep.c; NaN: nothing yet */
 } Contact;
 
-/* What the impulses of a solve change of a disk, and how it responds to 1 N s. The first body stands for everything that
-   does not move. */
+/* A contact of a sleeper, of which the other may be awake. Forces are on i, N. */
+typedef struct {
+    double impulse[3];      /* N s; as of `Contact`, when the later one fell asleep */
+    double bore[2], now[2]; /* when the first one fell asleep, and of late ... */
+    double felt[2];         /* ... and in the latest step */
+    double force[2], more[2]; /* what is told of it: what the first one counts on, and what the other has besides */
+    double branch[2];       /* m; of i off the other, or off its foot */
+    double spot[2];         /* m; where they touch, off i */
+    double from, told;      /* s; since when both sleep, or INFINITY; else, up to when the sleeper is told of */
+    double rise;            /* how far i is above j, of the way between them; 0 if they lean on each other */
+    int i, j, first, pad;   /* j as of `Contact`; which of them has slept for longer */
+} Frozen;
+
+/* What the impulses of a solve change of a disk, and what one of 1 N s does to it. The first of all is of
+   what does not give way. */
 typedef struct {
     double x, y, rim;       /* m/s; change of velocity, and of spin times radius */
     double mass;            /* 1/kg */
@@ -393,6 +411,9 @@ typedef struct {
     SolverFour *fours;   /* (four_room) the same in single precision */
     LeverFour *lever_fours; /* (four_room) ... and their levers */
     LightBody *light_bodies; /* (disks + 1 + movers) */
+    Frozen *frozen;      /* (2 contacts) of sleepers */
+    int *frozen_links;   /* (4 contacts) the next end of one, 2 n and 2 n + 1 of frozen n, of the same disk, or -1 */
+    double *balance;     /* (disks, 4, 2) room for conjugate gradients */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */
     int *near_links;     /* (2 near) the next place in `near` of the same disk, or -1 */
@@ -430,9 +451,9 @@ typedef struct {
     int landing;         /* owner on which a disk lands, or -1 */
     int ride_owner;      /* owner that rides are on */
     int pulley;          /* row of the drive pulley among the surfaces, or -1 */
-    double ride_incline; /* rad; angle at which the belt rises to the pulley */
-    int sweeps;          /* greatest number of sweeps of the contact solver */
-    int sleeps;          /* whether islands may fall asleep */
+    double ride_incline; /* rad; at which the belt rises to the pulley */
+    int sweeps;          /* of the contact solver, at most */
+    int sleeps;          /* whether any may fall asleep */
     double gx, gy;       /* m/s2 */
     double up[2];        /* unit vector against gravity */
     double air;          /* [in] kg/m3; density of still air, 0 without */
@@ -444,9 +465,11 @@ typedef struct {
     double accurate;     /* m/s; changes at which sweeps end */
     /* [out] */
     int knot_count, event_count, total_count, contact_count, near_count, earlier_count, swing_count;
-    int later_count;     /* pairs in `near` beyond `near_count`, added when a path changed within the step; -1: there is
-                            no room for them */
-    int woken;           /* whether the latest impact has woken any disk */
+    int frozen_count;
+    int roused;          /* what is frozen is to be looked through: some have been woken */
+    int later_count;     /* pairs in `near` beyond `near_count`, of what may meet since its path changed within the step; -1:
+                            there is no room for them */
+    int woken;           /* whether the latest blow has woken any */
     int impact_count, step_count, solve_count, sweep_count;
     int done;            /* number of disks that have ended, as a measure of progress */
     int stalled;         /* the disk that stalled */
@@ -726,12 +749,10 @@ typedef struct {
     int overflow;           /* [out] there were to be more bins than MOST_BINS, or than memory has room for */
     double each;            /* [in] s; length of a bin of lasting contacts; 0: they are not recorded */
     Lasting *lasting;       /* [out] bin by bin */
-    Lasting *asleep;        /* forces on sleepers, N; in no order */
-    int *seats;             /* hash table of this bin: rows of pairs, + 1 */
-    double *balance;        /* (disks, 4, 2) room for conjugate gradients */
+    int *seats;             /* rows of this bin by their pairs, + 1 */
     int lasting_count;      /* [out] */
-    int lasting_room, asleep_count, asleep_room, seat_count, first;
-    double bin;             /* the bin that begins with row `first` */
+    int lasting_room, seat_count, first, pad;
+    double bin;             /* which one `first` begins */
 } Loads;
 
 /* ---- What a run is judged by: a subject of its own, which shares nothing with the engines'. ---- */

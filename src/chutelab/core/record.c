@@ -167,7 +167,19 @@ void track_lasting(int i) {
     for (int n = 0; n < 3; n++) track->after_entries[n] = d->entries[n] + d->gain[n];
 }
 
-/* Note the state of a disk in flight whose path is bent by air. */
+/* Have a track go on in lasting contact, from the state that was noted last: what hops from there on did so before. */
+void last_on(int i) {
+    const Disk *d = W.disks + i;
+    Track *track = W.tracks + i;
+    memcpy(track->held, track->knot, sizeof track->held);
+    memcpy(track->past, track->held, sizeof track->past);
+    memcpy(track->after, &d->vx, sizeof track->after);
+    memcpy(track->after_entries, d->entries, sizeof track->after_entries);
+    track->angles[1] = d->turned;
+    track->lasted = 1;
+}
+
+/* Note the state of a disk that flies in air, where that bends its path. */
 void track_flying(int i) {
     const Disk *d = W.disks + i;
     double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};

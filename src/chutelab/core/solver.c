@@ -257,7 +257,7 @@ void solve_contacts(int again) {
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
         double least = INFINITY, heaviest = 0;
-        int driven = 0, cornered = 0, tied = 0, stirred = 0;
+        int driven = 0, cornered = 0, tied = 0, stirred = 0, rests = 0;
         W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
@@ -267,6 +267,7 @@ void solve_contacts(int again) {
             driven |= presses(c);
             W.swings_too |= c->hung > 0;
             cornered |= c->cornered;
+            rests |= sleeps(c->j);
             tied |= is_tied(c->i) || is_tied(c->j);
             stirred |= (a->supports && a->rest == 0) || (b->supports && b->rest == 0);
         }
@@ -279,7 +280,7 @@ void solve_contacts(int again) {
         }
         double accurate = W.accurate;
         int sweeps = W.sweeps;
-        if ((cornered || tied || W.swings_too) && to - from <= FEW_CONTACTS) accurate = FINE_FEW * W.pace;
+        if ((cornered || tied || W.swings_too) && to - from <= FEW_CONTACTS && !(rests && !are_few(W.contact_count))) accurate = FINE_FEW * W.pace;
         else if (cornered) {
             accurate = CROWD_CORNERS * accurate;
             if (stirred) sweeps = (int)(FEWER * sweeps);

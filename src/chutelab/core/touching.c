@@ -1,6 +1,7 @@
 /* Find the contacts at the beginning of a step, and what each of them needs: the change of normal velocity such that its
    gap is not negative at the end of the step. */
 
+#include <string.h>
 #include "core.h"
 
 /* Removal of overlaps, in radii. Up to SLOP an overlap stays. Of what is beyond, a step removes as much as opens the contact
@@ -144,6 +145,9 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     }
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     for (int n = 0; n < 3 && last; n++) c->impulse[n] = W.again * last->impulse[n];
+    for (int n = 0; n < 2; n++) c->mean[n] = last ? last->mean[n] : NAN;
+    c->frozen = find_frozen(c);
+    if (c->frozen && !last) memcpy(c->impulse, W.frozen[c->frozen - 1].impulse, 2 * sizeof(double));
     int was_pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
     /* A disk that was pressed comes down from its last hop. It may leave along the surface, not into it, and until it
        reaches the end of the face it hops. Beyond, the end presses it only if it is slow enough. */
@@ -260,7 +264,8 @@ int find_contacts(double h, int *woke) {
     *woke = 0;
     for (int n = 0; n < W.near_count; n++) {
         int i = W.near[2 * n], j = W.near[2 * n + 1], cornered = is_cornered(i, j);
-        if (cornered && !W.disks[i].corners) { int k = i; i = j; j = k; }
+        int both = cornered && W.disks[i].corners && W.disks[j].corners;
+        if (cornered && (both ? W.disks[i].mode != FREE : !W.disks[i].corners)) { int k = i; i = j; j = k; }
         Disk *a = W.disks + i, *b = W.disks + j;
         double least = MIN(a->radius, b->radius), reach = a->radius + b->radius + TOUCH * least;
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
@@ -270,8 +275,8 @@ int find_contacts(double h, int *woke) {
         double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least, 0);
         if (cornered) bound = MAX(bound, left_over(b, impacts, -1, least, 0));
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
-            bound = MAX(bound, cornered ? (W.earlier_count > FEW_CONTACTS ? LATEST : 1) * W.soft : MAX(W.soft, W.skip * least));
-        if (a->mode == ASLEEP || b->mode == ASLEEP) {
+            bound = MAX(bound, cornered ? (are_few(W.earlier_count) ? 1 : LATEST) * W.soft : MAX(W.soft, W.skip * least));
+        if (cornered && (!both || are_few(W.earlier_count)) && (a->mode == ASLEEP || b->mode == ASLEEP)) {
             wake(a->mode == ASLEEP ? i : j, W.t);
             *woke = 1;
         }

@@ -422,10 +422,13 @@ def test_a_wall_of_96_bricks_stands(rows):
 
 def apart(one, other):
     """Return by how much two convex polygons are apart along the best of their normals, m."""
-    edges = np.concatenate([np.roll(part, -1, axis=0) - part for part in (one, other)])
-    normals = np.stack([edges[:, 1], -edges[:, 0]]) / np.hypot(*edges.T)
-    near, far = (other @ normals).min(axis=0), (one @ normals).max(axis=0)
-    return (near - far).max()
+
+    def beyond(own, its):
+        edges = np.roll(own, -1, axis=0) - own
+        normals = np.stack([edges[:, 1], -edges[:, 0]]) / np.hypot(*edges.T)
+        return ((its @ normals).min(axis=0) - (own @ normals).max(axis=0)).max()
+
+    return max(beyond(one, other), beyond(other, one))
 
 
 def poured(count, until):

@@ -241,6 +241,62 @@ def test_a_collision_with_one_that_is_elsewhere_is_off_nothing():
     assert not bad.holds
 
 
+TURNING = {
+    "surface": [surface("paddle", (-0.5, 0.0), (0.5, 0.0)) | {"pivot": [0.0, 0.0], "turn": -90.0}],
+    **thrown((0.3, 0.3), (0.0, -1.0)),
+    "particle": {"radius": 0.01},
+    "run": {"until": 0.22},
+}
+"""A ball falls on a paddle that turns."""
+
+
+def test_a_bounce_off_what_moves_is_looked_for_where_it_is_by_then():
+    """Until the bounce the paddle has turned by 90 degrees a second."""
+    e = evidence(TURNING, "contact", 1e-3)
+    (hit,) = e.recording.select(Kind.IMPACT)
+    good = barriers.on_something(e)
+    still = replace(e.machine, movers=())
+    bad = barriers.on_something(Evidence(replace(e.recording, machine=still)))
+    assert good.holds
+    # Seen from where it was at the start, the ball is its height above, less its radius.
+    assert bad.figure == pytest.approx(abs(abs(hit["position"][1]) - 0.01), rel=1e-9)
+    assert abs(hit["position"][1]) > 0.05
+    assert not bad.holds
+
+
+BOXES = {
+    "particle": [{"name": "box", "shape": "box", "size": [0.02, 0.06], "mass": 0.1}],
+    "surface": [FLOOR],
+    "stream": [
+        {"at": [0.0, 0.03], "velocity": [0.5, 0.0], "interact": True},
+        {"at": [0.04, 0.03], "velocity": [0.0, 0.0], "interact": True},
+    ],
+    "run": {"until": 0.3, "engine": "contact"},
+}  # fmt: skip
+"""One box slides against another: 0.02 m lie between them, and each reaches 0.03 m up and down."""
+
+
+def test_boxes_meet_by_their_outlines():
+    """A circle of 0.01 m inside each would meet elsewhere, and lie 0.02 m above the floor."""
+    e = evidence(BOXES, "contact", 1e-3)
+    (first, *_) = np.flatnonzero(e.recording.events["kind"] == Kind.COLLISION)
+    good = barriers.on_something(e)
+    assert good.holds
+    away = adder("position", first, [-0.01, 0.0])
+    bad = barriers.on_something(evidence(BOXES, "contact", 1e-3, events=away))
+    assert bad.figure == pytest.approx(0.01, abs=good.bound)
+    assert not bad.holds
+
+
+def test_a_hinge_whose_energy_is_not_its_own_breaks_a_law_of_every_run():
+    flap = surface("flap", (0.0, 0.0), (0.3, 0.0)) | {"hinge": [0.0, 0.0], "mass": 0.2}
+    tables = {**TURNING, "surface": [flap]}
+    assert laws.of_every_run(evidence(tables, "contact", 1e-3)).holds
+    bad = laws.of_every_run(evidence(tables, "contact", 1e-3, swings=adder("rate", -1, 5.0)))
+    assert bad.figure == 1
+    assert "flap" in bad.detail
+
+
 def test_one_released_in_another_or_in_a_surface_has_no_room():
     starts = np.flatnonzero(crowd().recording.events["kind"] == Kind.RELEASE)
     there = crowd().recording.at([crowd().recording.events["t"][starts[1]]])[0][0][0]

@@ -365,16 +365,14 @@ def stress(scene: SceneName, *, engine: Engine, dt: float | None, set_: Texts, j
     No particle passes a surface, sinks into one or bounces off nothing; energy rises only by a
     belt's work; ledger and momentum close. Each law that has something to say about the scene is a
     line, with what was found and what it must not exceed. What the engine does not promise for such
-    a scene is listed with the reason. Exit code 1 if a law is broken. For scenes of disks without
-    joints.
+    a scene is listed with the reason. Exit code 1 if a law is broken.
     """
-    from chutelab.checks.stress import Evidence, judge, need_judged
+    from chutelab.checks.stress import Evidence, judge
     from chutelab.engines.simulation import judged
     from chutelab.results.recorder import StalledError
     from chutelab.util.tables import Sheet, plain
 
     loaded = loaded_as_told(scene, set_, engine, dt, loads=1000.0)
-    need_judged(loaded)
     try:
         with progress("simulating") as update:
             recording = judged(loaded, progress=update)

@@ -19,9 +19,10 @@ from chutelab.machine.parts import (
     Pulley,
 )
 from chutelab.machine.releases import RefusedError
-from chutelab.machine.shapes import Arcs, Pieces, Segments
+from chutelab.machine.shapes import Arcs, Pieces, Segments, apart, placed
 
 __all__ = [
     "DRIVE_PULLEY", "PASSES", "SWING", "Arcs", "Caution", "Joint", "Machine", "Mover",
-    "Particle", "Pieces", "Pulley", "RefusedError", "Segments", "ahead", "build", "hand_over",
+    "Particle", "Pieces", "Pulley", "RefusedError", "Segments", "ahead", "apart", "build",
+    "hand_over", "placed",
 ]  # fmt: skip

@@ -149,6 +149,11 @@ class Pieces(ABC):
         """Return the gaps (...) to disks round places, m; negative where they overlap."""
         return np.asarray(np.hypot(*np.moveaxis(self.away(places), -1, 0)) - radius)
 
+    def apart(self, outline: Floats) -> float:
+        """Return the distance of a convex outline, (n, 2), from one piece, m; see `apart`."""
+        ends = min(_corners_off(end[None], outline) for end in self.ends)
+        return min(ends, float(self.gap(outline).min()))
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Segments(Pieces):
@@ -309,6 +314,13 @@ class Arcs(Pieces):
         x = np.where(np.hypot(x, y) > 0.0, x, 1.0)
         return np.asarray(np.stack([x, y], axis=-1) / np.hypot(x, y)[..., None])
 
+    def apart(self, outline: Floats) -> float:
+        # The point of an edge that is nearest to the centre may be the nearest to the arc.
+        edge = np.roll(outline, -1, axis=0) - outline
+        share = ((self.center - outline) * edge).sum(axis=1) / (edge**2).sum(axis=1)
+        feet = outline + share.clip(0.0, 1.0)[:, None] * edge
+        return min(super().apart(outline), float(self.gap(feet).min()))
+
     def holds(self, place: Floats, near: float) -> Bools:
         """Whether points of the circles (..., 2) are on the arcs, and not `near` (m) an end."""
         way = self.radius * self._turned(place - self.center)
@@ -340,6 +352,29 @@ class Arcs(Pieces):
             return said
         first, last = np.degrees([self.begin, self.begin + self.extent])
         return f"{said}, {first:.6g}° to {last:.6g}°"
+
+
+def placed(outline: Floats, position: Floats, angle: float) -> Floats:
+    """Return the corners of an outline, turned counterclockwise (rad) and moved, (n, 2), m."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.asarray(position + outline @ np.array([[cosine, sine], [-sine, cosine]]))
+
+
+def apart(one: Floats, other: Floats) -> float:
+    """Return the distance of two convex outlines, (n, 2) and (m, 2), that do not overlap, m.
+
+    It is that of a corner of one from an edge of the other. An outline may be a single point. If
+    the outlines overlap a little, it is about the depth.
+    """
+    return min(_corners_off(one, other), _corners_off(other, one))
+
+
+def _corners_off(corners: Floats, outline: Floats) -> float:
+    off, edge = corners[:, None] - outline, np.roll(outline, -1, axis=0) - outline
+    square = (edge**2).sum(axis=1)
+    share = (off * edge).sum(axis=2) / np.where(square > 0.0, square, 1.0)
+    off -= share.clip(0.0, 1.0)[..., None] * edge
+    return float(np.hypot(*np.moveaxis(off, -1, 0)).min())
 
 
 KINDS: dict[str, type[Segments] | type[Arcs]] = {"Segment": Segments, "Arc": Arcs}

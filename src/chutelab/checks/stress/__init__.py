@@ -41,9 +41,8 @@ from chutelab.checks.stress.barriers import (
 )
 from chutelab.machine import Segments
 from chutelab.results.ledger import energy_at, ledger
-from chutelab.scene import Fault, Scene, SceneError
 
-__all__ = ["A_CONTACT", "EPS", "LAWS", "ROUNDINGS", "Evidence", "Verdict", "judge", "need_judged"]
+__all__ = ["A_CONTACT", "EPS", "LAWS", "ROUNDINGS", "Evidence", "Verdict", "judge"]
 
 Law = Callable[[Evidence], Verdict | None]
 
@@ -153,7 +152,8 @@ def momentum(e: Evidence) -> Verdict | None:
     all m |v|.
     """
     m = e.machine
-    if not e.machine.interact or not all(isinstance(piece, Segments) for piece in e.machine.pieces):
+    straight = all(isinstance(piece, Segments) for piece in m.pieces)
+    if not m.interact or not straight or m.movers or _tied_to_points(e):
         return None
     along = np.eye(2)
     if len(m.segments.length):
@@ -174,6 +174,10 @@ def momentum(e: Evidence) -> Verdict | None:
     return Verdict(figure, rounding, "of the sum of m |v|")
 
 
+def _tied_to_points(e: Evidence) -> bool:
+    return any(joint.other < 0 or joint.over is not None for joint in e.machine.joints)
+
+
 BORNE = 1e-9
 """Share of all impulses by which loads may differ from the change of momentum: rounding, and
 impulses that are booked at the end of a step instead of within it."""
@@ -184,7 +188,7 @@ def loads(e: Evidence) -> Verdict | None:
 
     The figure is a share of all impulses on surfaces and all sizes m |v|.
     """
-    if not e.machine.loads:
+    if not e.machine.loads or _tied_to_points(e):
         return None
     borne = e.recording.impulses["force"]
     first, last = e.recording.ends()
@@ -204,7 +208,7 @@ def spin(e: Evidence) -> Verdict | None:
     radii.
     """
     m = e.machine
-    if not e.machine.interact or e.machine.pieces or m.gravity > 0.0:
+    if not m.interact or m.pieces or m.gravity > 0.0 or _tied_to_points(e):
         return None
     first, last = e.recording.ends()
     middle = last["position"].mean(axis=0)
@@ -226,23 +230,15 @@ def spin(e: Evidence) -> Verdict | None:
     return Verdict(abs(total(last) - total(first)) / size, bound, "of the sum of m |x| |v|")
 
 
-def need_judged(scene: Scene) -> None:
-    """Raise a `SceneError` unless the laws apply to a scene: disks and fixed surfaces."""
-    allowed = "not judged: the laws are about disks without joints"
-    faults = [
-        Fault(f"{scene.head('particle', i)}.shape", kind.shape, allowed)
-        for i, kind in enumerate(scene.particles)
-        if kind.shape not in {"disk", "sphere"}
-    ]
-    faults += [Fault("surface", name, "not judged: it moves") for name in scene.movers]
-    if scene.one_sided:
-        faults.append(Fault("surface", scene.one_sided, "not judged: it is solid from one side"))
-    faults += [Fault(table, None, allowed) for table in {table: 0 for table, _ in scene.joints}]
-    if faults:
-        raise SceneError(scene.source, faults)
+def of_every_run(e: Evidence) -> Verdict:
+    """Laws by which every run is judged at its end; the figure counts those that are broken.
+
+    Among them are those of hinges, of particles with corners, and of each step's solution.
+    """
+    return Verdict(len(e.recording.laws), 0.0, next((one.told for one in e.recording.laws), "laws"))
 
 
-UNSEEN = ("nothing through", "nothing through another")
+UNSEEN = ("laws of every run", "nothing through", "nothing through another")
 """Laws that fail once a disk is on the wrong side of another or of a surface."""
 
 
@@ -283,6 +279,7 @@ LAWS: dict[str, Law] = {
     "momentum": momentum,
     "loads": loads,
     "angular momentum": spin,
+    "laws of every run": of_every_run,
 }
 """Every law by its name in the table."""
 

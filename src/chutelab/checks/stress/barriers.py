@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core import number
-from chutelab.machine import Machine
+from chutelab.machine import Machine, Mover, Pieces, apart, placed
 from chutelab.results import Kind, Recording
 from chutelab.results.laws import Findings, alike, examine, inner_radius
-from chutelab.util.arrays import Floats, Ints
+from chutelab.util.arrays import Bools, Floats, Ints
 
 EPS: float = number("EPS")
 
@@ -83,6 +83,32 @@ class Evidence:
     def radius(self) -> float:
         """Radius of the largest particle, m."""
         return float(np.max(self.machine.particle.radius))
+
+    @cached_property
+    def cornered(self) -> Bools:
+        """Which particles have corners, (N,)."""
+        kinds = np.array([outline is not None for outline in self.machine.outlines])
+        return kinds[self.machine.releases.kind]
+
+    @cached_property
+    def movers(self) -> dict[int, Mover]:
+        """What moves, by the index of its surface."""
+        return {mover.surface: mover for mover in self.machine.movers}
+
+    def outline(self, particle: int, t: float, place: Floats) -> tuple[Floats, float]:
+        """Return the corners of a particle, (n, 2), m, and 0; of a disk the centre and radius."""
+        corners = self.machine.outlines[self.machine.releases.kind[particle]]
+        if corners is None:
+            return place[None], float(self.radii[particle])
+        return placed(corners, place, self.recording.at([t]).angle[0, particle]), 0.0
+
+    def seen_from(self, piece: Pieces, times: Any, places: Floats) -> Floats:
+        """Return places (..., 2), m, at times (...,), s, where a piece is as written.
+
+        Of a piece that moves these are the places that turn and travel with it.
+        """
+        mover = self.movers.get(int(piece.surface))
+        return places if mover is None else mover.at_rest(places, times)
 
     @cached_property
     def energies(self) -> tuple[Floats, Floats]:
@@ -171,7 +197,7 @@ def overlap(e: Evidence) -> Verdict | None:
     if not e.machine.interact:
         return None
     found = []
-    for now in np.concatenate([_instants(e), _some(e, Kind.COLLISION)["t"]]):
+    for now in np.concatenate([_instants(e), _few(e.recording.select(Kind.COLLISION))["t"]]):
         (position,), _ = e.recording.at([now])
         there = np.flatnonzero(np.isfinite(position[:, 0]))
         deep, i, j = closest(position[there], e.radii[there])
@@ -230,8 +256,7 @@ def _instants(e: Evidence) -> Floats:
     return np.linspace(t.min(), t.max(), max(2, count))
 
 
-def _some(e: Evidence, kind: Kind) -> NDArray[Any]:
-    events = e.recording.select(kind)
+def _few(events: NDArray[Any]) -> NDArray[Any]:
     return events[:: 1 + len(events) // COLLISIONS]
 
 
@@ -272,15 +297,25 @@ def closest(position: Floats, radius: Floats) -> tuple[float, int, int]:
 def on_something(e: Evidence) -> Verdict | None:
     """Each impact lies on the surface, or the particle, that it names.
 
-    The figure is the largest distance of an event's place from what it names, less the radius, m.
+    The figure is the largest distance of the particle in an event from what the event names, m.
+    Where many particles meet, or have corners, only some of their impacts are looked at.
     """
     surfaces, found, late = e.machine.surfaces, [], e.dt or 0.0
     events = e.recording.select(*AT_SURFACES)
     events = events[(events["surface"] >= 0) & (events["surface"] < len(surfaces))]
+    angular = e.cornered[events["particle"]]
+    events = np.concatenate([events[~angular], _few(events[angular])])
     if len(events):
         off = np.full((len(surfaces), len(events)), inf)
+        outlines = {
+            n: e.outline(events[n]["particle"], events[n]["t"], events[n]["position"])[0]
+            for n in np.flatnonzero(e.cornered[events["particle"]])
+        }
         for piece in e.machine.pieces:
-            gap = np.abs(piece.gap(events["position"], e.radii[events["particle"]]))
+            seen = e.seen_from(piece, events["t"], events["position"])
+            gap = np.abs(piece.gap(seen, e.radii[events["particle"]]))
+            for n, outline in outlines.items():
+                gap[n] = piece.apart(e.seen_from(piece, events[n]["t"], outline))
             there = piece.there(events["t"], late)
             row = off[piece.surface]
             row[there] = np.minimum(row, gap)[there]
@@ -288,13 +323,13 @@ def on_something(e: Evidence) -> Verdict | None:
         hit = events[np.argmax(far)]
         place = f"particle {hit['particle']} off {surfaces[hit['surface']]}"
         found.append((far.max(), f"{place} at t = {hit['t']:.6g} s"))
-    for hit in _some(e, Kind.COLLISION):
-        i, j = int(hit["particle"]), int(hit["other"])
-        (place,), _ = e.recording.at([hit["t"]])
-        far = abs(np.hypot(*(place[j] - hit["position"])) - (e.radii[i] + e.radii[j]))
+    for hit in _few(e.recording.select(Kind.COLLISION)):
+        i, j, t = int(hit["particle"]), int(hit["other"]), float(hit["t"])
+        (place,), _ = e.recording.at([t])
+        (one, r), (other, s) = e.outline(i, t, hit["position"]), e.outline(j, t, place[j])
         # Without the partner it is NaN.
-        far = np.nan_to_num(far, nan=inf)
-        found.append((far, f"particles {i} and {j} at t = {hit['t']:.6g} s"))
+        far = np.nan_to_num(abs(apart(one, other) - r - s), nan=inf)
+        found.append((far, f"particles {i} and {j} at t = {t:.6g} s"))
     if not found:
         return None
     b = e.bounds
@@ -310,10 +345,11 @@ def released_free(e: Evidence) -> Verdict | None:
     for piece, name in zip(e.machine.pieces, e.machine.names, strict=True):
         there = releases[piece.there(releases["t"])]
         if len(there):
-            gap = piece.gap(there["position"], e.radii[there["particle"]])
+            place = e.seen_from(piece, there["t"], there["position"])
+            gap = piece.gap(place, e.radii[there["particle"]])
             at = int(np.argmin(gap))
             found.append((-gap[at], f"particle {there['particle'][at]} in {name}"))
-    for event in _some(e, Kind.RELEASE) if e.machine.interact else ():
+    for event in _few(releases) if e.machine.interact else ():
         (place,), _ = e.recording.at([event["t"]])
         apart = np.nan_to_num(np.hypot(*(place - event["position"]).T), nan=inf)
         deep = e.radii[event["particle"]] + e.radii - apart
@@ -340,7 +376,8 @@ def settled_to_stay(e: Evidence) -> Verdict | None:
     thrown: dict[int, str] = {}
     for piece, name in zip(e.machine.pieces, e.machine.names, strict=True):
         if piece.speed != 0.0 and piece.surface != m.landing:
-            on = piece.gap(last["position"], e.radii[settled]) < near
+            place = e.seen_from(piece, last["t"], last["position"])
+            on = piece.gap(place, e.radii[settled]) < near
             for i in settled[on & piece.there(last["t"])].tolist():
                 thrown.setdefault(i, f"particles: {i} on {name}")
     return Verdict(len(thrown), 0.0, next(iter(thrown.values()), "particles"))
@@ -354,7 +391,8 @@ values of both shapes, and a factor 0 would be 0 against surfaces too."""
 def cone(e: Evidence) -> Verdict | None:
     """No impact pulls; its tangential impulse is at most friction times its normal impulse.
 
-    The figure is the excess as a share of the largest momentum m v.
+    The figure is the excess as a share of the largest momentum m v. With corners an event is the
+    sum of impulses with several normals, which only must not pull.
     """
     events = e.recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
     if not len(events):
@@ -367,6 +405,10 @@ def cone(e: Evidence) -> Verdict | None:
     struck, _, _ = _struck(e, events[alone])
     friction[alone] = _of_pieces(e, events[alone], struck, "friction")
     rough = np.isinf(friction)
+    angular = e.cornered[events["particle"]] | (
+        e.cornered[events["other"]] & (events["other"] >= 0)
+    )
+    rough |= angular
     normal, along = events["normal_impulse"], np.abs(events["tangential_impulse"])
     excess = np.where(rough, 0.0, along - np.where(rough, 0.0, friction) * normal)
     momentum = e.masses.max() * e.bounds.speed
@@ -376,16 +418,17 @@ def cone(e: Evidence) -> Verdict | None:
 def rebound(e: Evidence) -> Verdict | None:
     """Judge whether speeds after impacts are the restitution times the speeds before.
 
-    This applies to single impacts, so not to crowds and corners. A stepped engine may let a
-    particle rest if gravity brings it back within a step, and the pymunk engine has speeds only to
-    the change by gravity in one step. A mass point has no contact normal. The figure is the
-    deviation as a share of the largest speed.
+    This applies to single impacts on what does not move, so not to crowds and corners. What is as
+    slow as gravity makes it in a step may do what it likes in a stepped engine, but be faster than
+    before; and the pymunk engine has speeds only to that change. A mass point has no contact
+    normal. The figure is the deviation as a share of the largest speed.
     """
     events = e.recording.select(Kind.IMPACT, Kind.LANDING)
     if e.alike or e.machine.interact or not e.radii.all():
         return None
     struck, away, touched = _struck(e, events)
-    events, struck, away = (of[touched == 1] for of in (events, struck, away))
+    still = ~np.isin(events["surface"], list(e.movers)) & ~e.cornered[events["particle"]]
+    events, struck, away = (of[(touched == 1) & still] for of in (events, struck, away))
     if not len(events):
         return None
     normal = away / np.hypot(*away.T)[:, None]
@@ -393,8 +436,9 @@ def rebound(e: Evidence) -> Verdict | None:
     after = (events["velocity_after"] * normal).sum(axis=1)
     due = -before * _of_pieces(e, events, struck, "restitution")
     rounding, pull = ROUNDINGS * EPS, e.machine.gravity * (e.dt or 0.0) / e.bounds.speed
-    stays = (np.abs(after) <= rounding * e.bounds.speed) & (due <= pull * e.bounds.speed)
-    off = np.where(stays, 0.0, np.abs(after - due)) / e.bounds.speed
+    slow = (due <= pull * e.bounds.speed) & (after >= -rounding * e.bounds.speed)
+    slow &= after <= np.maximum(-before, rounding * e.bounds.speed)
+    off = np.where(slow, 0.0, np.abs(after - due)) / e.bounds.speed
     return _verdict(events, off, "of v", pull if e.recording.engine == "pymunk" else 0.0)
 
 
@@ -415,7 +459,8 @@ def _struck(e: Evidence, events: NDArray[Any]) -> tuple[Ints, Floats, Ints]:
     struck, away = np.zeros(len(events), dtype=int), np.zeros((len(events), 2))
     near = e.bounds.rounding + e.bounds.arcs + e.bounds.late
     for n, piece in enumerate(e.machine.pieces):
-        out, face = piece.away(events["position"]), piece.normal(events["position"])
+        place = e.seen_from(piece, events["t"], events["position"])
+        out, face = piece.away(place), piece.normal(place)
         # Beside a face the vector is along its normal; for small disks positions give it only
         # roughly.
         high = (out * face).sum(axis=1)[:, None] * face

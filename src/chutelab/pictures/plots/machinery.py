@@ -23,7 +23,7 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
 
-from chutelab.machine import Arcs, Machine, Pieces, Segments
+from chutelab.machine import Arcs, Machine, Pieces, Segments, placed
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import Window, around, motion, strings
 from chutelab.pictures.plots.style import figures, named, say, stream_colours
@@ -346,14 +346,14 @@ class _Names:
                 right = max(frame.x0 - box.x0, 0.0) + min(frame.x1 - box.x1, 0.0)
                 up = max(frame.y0 - box.y0, 0.0) + min(frame.y1 - box.y1, 0.0)
                 offset = (offset[0] + right * points, offset[1] + up * points)
-                placed, box = (where, offset, across, along), box.translated(right, up)
+                spot, box = (where, offset, across, along), box.translated(right, up)
                 # Lines, circles and releases that it would cover.
                 on = (self.starts > box.min) & (self.starts < box.max)
                 hides = sum(line.intersects_bbox(box, filled=whole) for line, whole in self.lines)
                 hides += bool(on.all(axis=1).any())
                 if box.count_overlaps(self.taken) or (best is not None and hides >= best[0]):
                     continue
-                best = hides, placed, box
+                best = hides, spot, box
                 if not hides:
                     break
             if best is None:
@@ -538,12 +538,6 @@ class Bodies:
                 if np.isfinite(position[i, 0])
             ]
             self._polygons.set_verts(there)
-
-
-def placed(outline: Floats, position: Floats, angle: float) -> Floats:
-    """Return the corners of an outline, turned counterclockwise (rad) and moved, (n, 2), m."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return np.asarray(position + outline @ np.array([[cosine, sine], [-sine, cosine]]))
 
 
 LEAST = 1.5

@@ -223,7 +223,7 @@ static void book_lasting(const Contact *c, double past, double h) {
 /* After the solve: ledger entries, supports, timers, tracks. */
 void close_step(double h) {
     /* The share of the impulses that belongs to the step before; 0 for a new contact. */
-    W.before = W.length_before > 0 ? W.length_before / (W.length_before + h) : 0.5;
+    W.before = h > 0 ? W.length_before / (W.length_before + h) : 0;
     if (!W.interact && !W.tracks[W.low].lasted) W.before = 0;
     for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from matplotlib.patches import Rectangle
 from matplotlib.transforms import Bbox
 from PIL import Image, ImageDraw
 
@@ -29,6 +28,7 @@ from chutelab.pictures.animation import (
     moments,
 )
 from chutelab.pictures.animation.actors import SIGNS
+from chutelab.pictures.animation.drawing import Arrows, Canvas, Itself, painter
 from chutelab.pictures.animation.files import palette, write_gif
 from chutelab.pictures.animation.moments import sentence, slowness, span
 from chutelab.pictures.plots import Window, style, window_of
@@ -82,18 +82,8 @@ def moved(stage, index):
 
 
 def blocks_of(stage, index):
-    """Draw a moment; return the heights of the entries in each bar: put in, and is now."""
-    stage.frame(index)
-    blocks = [one for one, _ in stage.moving if isinstance(one, Rectangle)]
-    return [
-        {str(one.get_gid()): one.get_height() for one in blocks if one.get_x() == left}
-        for left in (-0.4, 0.6)
-    ]
-
-
-def bar_axes(stage):
-    (axes,) = {one.axes for one, _ in stage.moving if isinstance(one, Rectangle)}
-    return axes
+    """Return the heights of the entries in each bar at a moment: put in, and is now."""
+    return [{name: up[index] for name, up in bar.heights.items()} for bar in stage.bars]
 
 
 def clock(stage, index):
@@ -406,10 +396,10 @@ def test_actors_stand_where_the_particle_is():
         assert f"t = {t:.2f} s" == clock(stage, i)
         # A component is drawn only beside another: here both, and the velocity itself.
         arrows = drawn["arrows"]
-        assert np.stack([arrows.U, arrows.V], axis=1) == pytest.approx(
+        assert (arrows.tips - arrows.tails) / layout.arrow == pytest.approx(
             np.array([(pace[0], 0.0), (0.0, pace[1]), pace]), abs=1e-9
         )
-        assert np.asarray(arrows.get_offsets()) == pytest.approx(np.tile(known, (3, 1)), abs=1e-14)
+        assert arrows.tails == pytest.approx(np.tile(known, (3, 1)), abs=1e-14)
 
 
 def test_crowd_is_at_the_recorded_positions_and_says_how_many():
@@ -456,7 +446,7 @@ def stacked(stage):
     names = {bytes.fromhex(colour[1:]): name for name, colour in style.ENERGY.items()}
     found = []
     for x in (0.0, 1.0):
-        column, base = bar_axes(stage).transData.transform((x, 0.0))
+        column, base = stage.figure.axes[1].transData.transform((x, 0.0))
         pixels = shown[: HEIGHT - round(base), round(column)][::-1]
         rows = [names.get(pixel.tobytes()) for pixel in pixels]
         end = rows.index(None)
@@ -703,6 +693,46 @@ def test_frames_leave_no_traces_in_each_other(runs):
     np.testing.assert_array_equal(np.asarray(fresh.frame(0))[scene_alone], last[scene_alone])
 
 
+@pytest.mark.parametrize("name", some(["domino-gate", "see-saw", "bucket-elevator", "hopper"], 2))
+def test_parts_hold_all_that_changes_and_lines_are_as_matplotlib_draws_them(name):
+    recording = simulate(name)
+    shots, slow = filmed(recording)
+    shots = shots[:: len(shots) // 7]
+    stage, plain = (stage_of(recording, shots, slow) for _ in range(2))
+    plain._painters = [
+        artist if isinstance(artist, Arrows) else Itself(artist) for artist, _ in plain.moving
+    ]
+    before = np.array(stage.frame(0))
+    for index in range(1, len(shots)):
+        shown, parts = stage.paint(index)
+        still = np.ones((HEIGHT, WIDTH), dtype=bool)
+        for part in parts:
+            still[part] = False
+        changes = (shown[..., :3] != before).any(axis=2)
+        assert changes.any()
+        assert not changes[still].any()
+        before = shown[..., :3].copy()
+        np.testing.assert_array_equal(before, plain.frame(index))
+
+
+@pytest.mark.parametrize("look", [{"ls": "none", "marker": "o", "ms": 9.0}, {"lw": 5.0}])
+def test_parts_hold_what_is_drawn_on_the_edges_of_axes(look):
+    """The axes begin between two of 100 pixels."""
+    around = [0.0, 0.0, 1.0, 1.0, 0.0], [0.0, 1.0, 1.0, 0.0, 0.0]
+    for share in (0.3, 0.301, 0.304, 0.305, 0.306, 0.309):
+        figure = style.Picture((1.0, 1.0), 100)
+        axes = figure.add_axes((share, share, 0.4, 0.4), xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+        axes.set_axis_off()
+        (line,) = axes.plot(*around, animated=True, **look)
+        canvas = Canvas(figure)
+        still, before = np.ones((100, 100), dtype=bool), canvas.pixels.copy()
+        for part in painter(line).paint(canvas):
+            still[part] = False
+        changes = canvas.pixels != before
+        assert changes.any()
+        assert not changes[still].any()
+
+
 def boxes_of(stage, index):
     """Return where text is in the picture, what is painted as pixels included."""
     found = [(text.get_text(), text.get_window_extent()) for text in seen(stage.figure)]
@@ -832,7 +862,8 @@ def written(pictures, delays):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "written.gif"
         opaque = (np.dstack([one, np.full(one.shape[:2], 255, np.uint8)]) for one in pictures)
-        write_gif(path, opaque, delays)
+        whole = [(slice(0, None), slice(0, None))]
+        write_gif(path, ((one, whole) for one in opaque), delays)
         return path.read_bytes()
 
 

@@ -5,6 +5,7 @@ picture of the machine before it begins.
 
 - `moments`: the moments that are shown, their duration, and what happened, in words.
 - `actors`: moving parts: particles, arrows, belts, pulley, and the energy bars.
+- `drawing`: how they are drawn, and which pixels that changes.
 - `files`: how pictures become a GIF or a video.
 """
 
@@ -14,7 +15,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import shorten
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,10 +23,9 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image
 
 from chutelab.pictures.animation.actors import (
-    Writing,
     arrows,
     bars,
     bodies,
@@ -38,6 +38,7 @@ from chutelab.pictures.animation.actors import (
     strung,
     trail,
 )
+from chutelab.pictures.animation.drawing import Bar, Canvas, Part, Writing, painter
 from chutelab.pictures.animation.files import (
     VIDEOS,
     VideoError,
@@ -177,8 +178,8 @@ class Stage:
 
     `slow` is seconds on the screen for one second of the recording. The analytic path is shown from
     the first moment on, or after the time `ask`, s. `figure` is the background and `view` the axes
-    of the scene in it; `moving` has the moving parts, from back to front, and `writings` the
-    changing texts.
+    of the scene in it; `moving` has the moving parts, from back to front, `bars` those of the
+    ledger, and `writings` the changing texts.
     """
 
     def __init__(
@@ -194,7 +195,6 @@ class Stage:
         # A hundredth of a pixel more: the canvas rounds down.
         inches = (layout.width + 0.01) / layout.dpi, (layout.height + 0.01) / layout.dpi
         self.figure = Picture(inches, layout.dpi)
-        self.canvas = cast(Any, self.figure.canvas)  # its methods are not annotated
         self.view = view = self.figure.add_axes(layout.view)
         parts = analytic_of(recording)[0] if "parabola" in shows else ()
         draw_scene(view, recording.machine, layout.window, clear=path_of_arcs(parts))
@@ -240,39 +240,41 @@ class Stage:
         self.moving += bodies(view, recording, np.array([0]), times, "disk", style.STRIKE, 0.4)
         self.moving += names(view, recording.machine, times)
         self.writings = self._add_text(layout, pace_words(slow), moments)
+        self.bars: list[Bar] = []
         if "energy" in shows:
             # Above the bars is room for their title, and the clock.
             top = layout.view[1] + layout.view[3] - 0.06
             axes = self.figure.add_axes((0.765, 0.43, 0.225, top - 0.43))
-            table = self.figure.add_axes((0.73, 0.125, 0.26, 0.245))
-            blocks, column = bars(
+            table = 0.73, 0.125, 0.26, 0.245
+            self.bars, column = bars(
                 axes, table, energies(recording, times), drives=paid_by(recording)
             )
-            self.moving += blocks
             self.writings += column
-        self.canvas.draw()
-        self._background = self.canvas.copy_from_bbox(self.figure.bbox)
-        # Pillow writes where Matplotlib has drawn.
-        self._pixels = np.asarray(self.canvas.buffer_rgba())
-        size = self.canvas.get_width_height()
-        shared = Image.frombuffer("RGBA", size, self._pixels, "raw", "RGBA", 0, 1)
-        shared.readonly = 0
-        self._draw = ImageDraw.Draw(shared)
+        self._canvas = Canvas(self.figure)
+        self._painters = [painter(artist) for artist, _ in self.moving]
+        self._painted: list[Part] = []
 
-    def paint(self, index: int) -> NDArray[np.uint8]:
-        """Draw one moment; return its pixels, (H, W, 4), RGBA: until the next is drawn."""
-        self.canvas.restore_region(self._background)
-        renderer = self.canvas.get_renderer()
-        for artist, show in self.moving:
+    def paint(self, index: int) -> tuple[NDArray[np.uint8], list[Part]]:
+        """Draw one moment; return its pixels, (H, W, 4), RGBA, until the next is drawn.
+
+        With the parts outside of which they are those of the moment painted before.
+        """
+        # Nothing else is where bars and texts are.
+        panel: list[Bar | Writing] = [*self.bars, *self.writings]
+        news = [one for one in panel if not one.stays(index)]
+        before = [*self._painted, *(one.part for one in news)]
+        self._canvas.clear(before)
+        self._painted = []
+        for (_, show), one in zip(self.moving, self._painters, strict=True):
             show(index)
-            artist.draw(renderer)
-        for writing in self.writings:
-            writing.paint(self._draw, index)
-        return self._pixels
+            self._painted += one.paint(self._canvas)
+        return self._canvas.rgba, [
+            *before, *self._painted, *(one.paint(self._canvas, index) for one in news)
+        ]  # fmt: skip
 
     def frame(self, index: int) -> Image.Image:
         """Return the picture of one moment, RGB."""
-        return Image.fromarray(self.paint(index)).convert("RGB")
+        return Image.fromarray(self.paint(index)[0]).convert("RGB")
 
     def _add_text(self, layout: Layout, pace: str, moments: tuple[Moment, ...]) -> list[Writing]:
         """Write title, question and pace; return clock and caption, which change."""

@@ -7,23 +7,19 @@ now.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
-from math import ceil, floor
 from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgba
-from matplotlib.font_manager import FontProperties, findfont
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation
-from PIL import Image, ImageDraw, ImageFont
 
 from chutelab.machine import Arcs, Machine, Pieces
 from chutelab.machine.parts import Mover
+from chutelab.pictures.animation.drawing import Arrows, Bar, Writing
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.machinery import (
     LEAST,
@@ -129,30 +125,16 @@ def arrows(ax: Axes, position: Floats, velocity: Floats, length: float) -> Movin
 
     `position` and `velocity`, (T, 2), are those at the film's times.
     """
-    drawn = ax.quiver(
-        *np.zeros((4, 3)),
-        color=[*style.VELOCITY.values(), style.INK],
-        angles="xy",
-        scale_units="xy",
-        scale=1.0 / length,
-        units="dots",
-        width=SHAFT * ax.figure.dpi / 72.0,
-        minlength=0.0,
-        # Heads of short arrows shrink with them.
-        headwidth=0.8 * HEAD / SHAFT,
-        headlength=HEAD / SHAFT,
-        headaxislength=HEAD / SHAFT,
-        zorder=2.0,
-        gid="arrows",
-        animated=True,
-    )
+    points, colors = ax.figure.dpi / 72.0, [*style.VELOCITY.values(), style.INK]
+    drawn = Arrows(ax, colors, SHAFT * points, (HEAD * points, 0.8 * HEAD * points), "arrows")
     # Components are drawn if both are large enough to be distinguished from the whole.
     two = length * np.abs(velocity).min(axis=1) > SEEN * HEAD / points_of(ax, 1.0)
+    ways = length * velocity[:, None] * [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
+    ways[~two, :2] = 0.0
 
     def show(index: int) -> None:
-        vx, vy = velocity[index]
-        drawn.set_offsets([position[index]] * 3)
-        drawn.set_UVC([vx * two[index], 0.0, vx], [0.0, vy * two[index], vy])
+        drawn.tails = np.repeat(position[index : index + 1], 3, axis=0)
+        drawn.tips = drawn.tails + ways[index]
 
     return drawn, show
 
@@ -328,68 +310,6 @@ def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
     return moving
 
 
-class Writing:
-    """A text that changes from frame to frame, by Pillow; `said` has the text of each moment.
-
-    Matplotlib lays out a changed text again, which for the eight texts of a frame takes 3.3 ms, ten
-    times as long as with Pillow. The size is in pt, the place in pixels from the left and the top;
-    `anchor`, as in Pillow, says which point of the text is there, such as "rs": the right end of
-    the base line.
-    """
-
-    def __init__(
-        self, size: float, dpi: float, x: float, y: float, anchor: str, said: list[str]
-    ) -> None:
-        path = findfont(FontProperties())
-        self.font = ImageFont.truetype(
-            path, size * dpi / 72.0, layout_engine=ImageFont.Layout.BASIC
-        )
-        self.place, self.anchor, self.said = (round(x), round(y)), anchor, said
-        # Texts that stay, or come again, as what covers the picture, and from where on.
-        self.again = {text for text, many in Counter(said).items() if many > 1}
-        self.masks: dict[str, tuple[tuple[int, int], Image.Image]] = {}
-
-    def paint(self, draw: ImageDraw.ImageDraw, index: int) -> None:
-        """Write the text of a moment onto a picture."""
-        said, gap = self.said[index], 0.35 * self.font.size
-        if said not in self.again:
-            draw.text(self.place, said, style.INK, self.font, self.anchor, spacing=gap)
-            return
-        if said not in self.masks:
-            box = draw.textbbox(self.place, said, self.font, self.anchor, gap)
-            left, top, right, bottom = floor(box[0]), floor(box[1]), ceil(box[2]), ceil(box[3])
-            mask = Image.new("L", (max(1, right - left), max(1, bottom - top)))
-            place = self.place[0] - left, self.place[1] - top
-            ImageDraw.Draw(mask).text(place, said, 255, self.font, self.anchor, spacing=gap)
-            self.masks[said] = (left, top), mask
-        draw.bitmap(*self.masks[said], style.INK)
-
-
-class Block(Rectangle):
-    """A rectangle without an edge, filled by whole pixels, as Agg does it in ten times the time.
-
-    It stays on axes as they are.
-    """
-
-    def __init__(self, ax: Axes, left: float, width: float, color: str, gid: str) -> None:
-        super().__init__((left, 0.0), width, 0.0, lw=0.0, color=color, gid=gid)
-        self.zero = ax.transData.transform((0.0, 0.0)).tolist()
-        self.one = (ax.transData.transform((1.0, 1.0)) - self.zero).tolist()
-        self.colour = int.from_bytes([round(255.0 * share) for share in to_rgba(color)], "little")
-
-    def draw(self, renderer: Any) -> None:
-        """Fill its pixels."""
-        if self.get_visible():
-            pixels = np.asarray(renderer.buffer_rgba()).view("<u4")[..., 0]
-            x, y = self.get_xy()
-            left, right, low, high = (
-                floor(self.zero[axis] + self.one[axis] * place + 0.5)
-                for axis, start, size in ((0, x, self.get_width()), (1, y, self.get_height()))
-                for place in (start, start + size)
-            )
-            pixels[len(pixels) - high : len(pixels) - low, left:right] = self.colour
-
-
 SIGNS = {
     "start": 1,
     "belt_work": 1,
@@ -420,51 +340,48 @@ def stacks(balance: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Flo
 
 
 def bars(
-    ax: Axes, table: Axes, balance: dict[str, Floats], *, drives: str = "belt_work"
-) -> tuple[list[Moving], list[Writing]]:
-    """Return the blocks of two stacked bars on `ax`, and a column of figures on `table`.
+    ax: Axes,
+    column: tuple[float, float, float, float],
+    balance: dict[str, Floats],
+    *,
+    drives: str = "belt_work",
+) -> tuple[list[Bar], list[Writing]]:
+    """Return two stacked bars on `ax`, and figures with their names in a column.
 
-    The ledger is as for `stacks`; the highest bar sets the scale. The work of belts, drives and
-    hinges is one block, with the name `drives`.
+    The column's left, bottom, width and height are shares of the picture. The ledger is as for
+    `stacks`; the highest bar sets the scale. The work of belts, drives and hinges is one block,
+    with the name `drives`.
     """
     sides = stacks(balance)
     highest = float(np.max(sum(sides[0].values())))
     factor, unit = style.scaled(highest, "J")
-    style.dress(ax, title=say("energy", unit=unit))
+    style.dress(ax)
+    # At its place at once: Matplotlib would look for room between all labels.
+    look: dict[str, Any] = {"fontsize": style.NORMAL, "fontweight": "bold"}
+    ax.set_title(say("energy", unit=unit), loc="left", y=1.0, **look)
     ax.grid(visible=False, axis="x")
     ax.set(xlim=(-0.6, 1.6), ylim=(0.0, 1.06 * factor * highest or 1.0))
     ax.set_xticks([0, 1], [say("put-in"), say("is-now")], fontsize=style.SMALL)
     ax.tick_params(axis="x", length=0)
-
-    def block(name: str, left: float, base: Floats, height: Floats) -> Moving:
-        shape = Block(ax, left, 0.8, style.ENERGY[name], name)
-        shape.set_animated(True)
-        ax.add_patch(shape)
-
-        def show(index: int) -> None:
-            shape.set_bounds(left, base[index], 0.8, height[index])
-            shape.set_visible(height[index] > 0.0)
-
-        return shape, show
-
-    moving = []
+    drawn = []
     for left, side in zip((-0.4, 0.6), sides, strict=True):
-        base = np.zeros_like(balance["start"])
-        for name, values in side.items():
-            moving.append(block(name, left, base, factor * values))
-            base = base + factor * values
-    table.set_axis_off()
-    table.set(xlim=(0.0, 1.0), ylim=(len(sides[0]), 0.0))
-    writings = []
+        heights = {name: factor * values for name, values in side.items()}
+        drawn.append(Bar(ax, left, left + 0.8, heights, [style.ENERGY[name] for name in heights]))
+    picture, writings = ax.figure.canvas.figure, []
+    left, bottom, width, height = column
+    line = height / len(sides[0])
     for row, name in enumerate(sides[0]):
         shown = [round(factor * value, 1) + 0.0 for value in balance[name].tolist()]
         if name == "residual" and not any(shown):
             continue
         told = drives if name == "belt_work" else name
         said = [figures(value, ".1f") for value in shown]
-        table.add_patch(Rectangle((0.0, row + 0.2), 0.05, 0.6, color=style.ENERGY[name]))
-        table.text(0.08, row + BASE, say(f"ledger-{told}"), fontsize=style.SMALL)
-        right, up = table.transData.transform((1.0, row + BASE))
-        place = right, ax.figure.bbox.height - up
-        writings.append(Writing(style.SMALL, ax.figure.dpi, *place, "rs", said))
-    return moving, writings
+        top = bottom + height - row * line
+        key = Rectangle((left, top - 0.8 * line), 0.05 * width, 0.6 * line)
+        key.set(color=style.ENERGY[name], transform=picture.transFigure)
+        picture.add_artist(key)
+        up = top - BASE * line
+        picture.text(left + 0.08 * width, up, say(f"ledger-{told}"), fontsize=style.SMALL)
+        across, along = picture.transFigure.transform((left + width, 1.0 - up))
+        writings.append(Writing(style.SMALL, picture.dpi, across, along, "rs", said))
+    return drawn, writings

@@ -18,7 +18,9 @@ from PIL import Image
 from PIL.GifImagePlugin import getdata, getheader
 
 from chutelab.pictures import PURPLE
+from chutelab.pictures.animation.drawing import Part
 from chutelab.pictures.plots import style
+from chutelab.util.arrays import Ints
 from chutelab.util.errors import MissingLibraryError
 
 
@@ -54,31 +56,50 @@ class Colours:
 
     def __init__(self) -> None:
         self.table = b"".join(bytes.fromhex(colour[1:]) for colour in palette())
-        self.reference = Image.new("P", (1, 1))
-        self.reference.putpalette(self.table)
-        # Table over the upper six bits of red, green and blue, filled by Pillow.
+        # Table over the upper six bits of red, green and blue, filled as they come.
         self.known = np.full(1 << 18, -1, dtype=np.int16)
 
     def of(self, pixels: NDArray[np.uint32]) -> NDArray[np.uint8]:
-        """Return the numbers of the colours of pixels (n,), RGBA."""
+        """Return the numbers of the nearest colours of pixels (n,), RGBA."""
         keys = (pixels >> 2 & 0x3F) | (pixels >> 4 & 0xFC0) | (pixels >> 6 & 0x3F000)
-        new = np.unique(keys[self.known[keys] < 0])
-        if len(new):
-            parts = [(new >> shift & 0x3F) << 2 for shift in (0, 6, 12)]
-            some = Image.fromarray(np.stack(parts, axis=-1).astype(np.uint8)[None])
-            few = some.quantize(palette=self.reference, dither=Image.Dither.NONE)
-            self.known[new] = np.asarray(few)[0]
-        found: NDArray[np.uint8] = self.known[keys].astype(np.uint8)
-        return found
+        found = self.known[keys]
+        if (found < 0).any():
+            new = np.unique(keys[found < 0])
+            parts = np.stack([new << 2 & 0xFC, new >> 4 & 0xFC, new >> 10 & 0xFC], axis=-1)
+            colours = np.frombuffer(self.table, np.uint8).reshape(-1, 3)
+            away = parts.astype(int)[:, None] - colours
+            self.known[new] = (away**2).sum(axis=2).argmin(axis=1)
+            found = self.known[keys]
+        return np.asarray(found, dtype=np.uint8)
+
+
+def changed(now: NDArray[np.uint32], before: NDArray[np.uint32], parts: Iterable[Part]) -> Ints:
+    """Return the numbers of the pixels, row by row, that changed in parts of a picture.
+
+    The picture before becomes the picture now.
+    """
+    found = [np.empty(0, dtype=np.intp)]
+    for rows, columns in parts:
+        new, old = now[rows, columns], before[rows, columns]
+        (at,) = (new != old).ravel().nonzero()
+        if len(at):
+            old[:] = new
+            y, x = np.divmod(at, new.shape[1])
+            found.append((y + rows.start) * now.shape[1] + x + columns.start)
+    return np.concatenate(found)
 
 
 def write_gif(
-    path: Path, pictures: Iterable[NDArray[np.uint8]], delays: Iterable[int], comment: str = ""
+    path: Path,
+    pictures: Iterable[tuple[NDArray[np.uint8], Iterable[Part]]],
+    delays: Iterable[int],
+    comment: str = "",
 ) -> None:
     """Write pictures of one size, (H, W, 4), RGBA, as a GIF that loops for ever.
 
-    Each stays for its delay in hundredths of a second; equal ones in a row become one frame. Only
-    the part that changed is converted and written. The comment is stored, not shown.
+    With each are the parts outside of which it is the one before. It stays for its delay in
+    hundredths of a second; equal ones in a row become one frame. Only pixels that changed are
+    converted and written. The comment is stored, not shown.
     """
     colours = Colours()
     # The table ends with a colour that no pixel has; it is transparent, so that the last frame
@@ -90,21 +111,23 @@ def write_gif(
         """Yield frames with their places and durations."""
         waits: tuple[NDArray[np.uint8], tuple[int, int]] | None = None
         stays = 0
-        for picture, delay in zip(pictures, delays, strict=True):
-            now = picture.view("<u4")[..., 0].ravel()
+        for (picture, parts), delay in zip(pictures, delays, strict=True):
+            now = picture.view("<u4")[..., 0]
             if waits is None:
-                shown = colours.of(now)
-                before, waits = now.copy(), (shown.reshape(picture.shape[:2]), (0, 0))
+                before, shown = now.copy(), np.empty(now.size, dtype=np.uint8)
+                starts = np.flatnonzero(np.diff(now.ravel(), prepend=~now[0, :1]))
+                lengths = np.diff(starts, append=now.size)
+                shown[:] = np.repeat(colours.of(now.ravel()[starts]), lengths)
+                waits = shown.reshape(now.shape).copy(), (0, 0)
             else:
-                (changed,) = (now != before).nonzero()
-                before[changed] = now[changed]
-                found = colours.of(now[changed])
-                other = found != shown[changed]
-                changed, found = changed[other], found[other]
-                if len(changed):
+                places = changed(now, before, parts)
+                found = colours.of(now.ravel()[places])
+                other = found != shown[places]
+                places, found = places[other], found[other]
+                if len(places):
                     yield *waits, stays
-                    shown[changed] = found
-                    y, x = np.divmod(changed, picture.shape[1])
+                    shown[places] = found
+                    y, x = np.divmod(places, now.shape[1])
                     top, left = y.min(), x.min()
                     frame = np.full((y.max() - top + 1, x.max() - left + 1), clear, dtype=np.uint8)
                     frame[y - top, x - left] = found

@@ -111,7 +111,7 @@ def plates(machine: Machine) -> set[str]:
 
 def _add(ax: Axes, outline: Path, face: str, edge: str) -> None:
     patch = PathPatch(outline, facecolor=face, edgecolor=edge, linewidth=0.7, zorder=BEHIND)
-    ax.add_patch(patch)
+    ax.add_artist(patch)
 
 
 def _stadium(axes: Floats, radius: float) -> Floats:
@@ -136,11 +136,11 @@ def _loop(ax: Axes, axes: Floats, radius: float, wheel: float, thick: float, poi
     for center in axes:
         circle = Circle(tuple(center.tolist()), wheel, zorder=BEHIND + 0.1)
         circle.set(facecolor=style.STEEL_LIGHT, edgecolor=style.STEEL, linewidth=0.9)
-        ax.add_patch(circle)
+        ax.add_artist(circle)
         if wheel * points > HUB:
             hub = Circle(tuple(center.tolist()), 0.16 * wheel, zorder=BEHIND + 0.3)
             hub.set(facecolor=style.STEEL, edgecolor=style.MUTED, linewidth=0.7)
-            ax.add_patch(hub)
+            ax.add_artist(hub)
 
 
 def pieces(machine: Machine) -> tuple[Pieces, ...]:
@@ -177,7 +177,7 @@ def draw_piece(ax: Axes, machine: Machine, piece: Pieces, **look: Any) -> Circle
     circle = Circle(tuple(piece.center.tolist()), radius if width == 2.0 else 0.75 * radius)
     circle.set(facecolor=style.STEEL_LIGHT if out.all() else "none", edgecolor=color)
     circle.set(linewidth=width, zorder=1.0, gid=gid, **look)
-    ax.add_patch(circle)
+    ax.add_artist(circle)
     return circle
 
 

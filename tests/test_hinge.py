@@ -201,14 +201,20 @@ def test_a_stop_takes_what_comes_to_it():
     assert blow == pytest.approx(found, abs=1e-9)
 
 
-def test_what_a_spring_presses_against_its_stop_is_at_rest_from_the_start():
-    """In a step of 1 ms its 0.3 N m give 0.3 rad/s to 1e-3 kg m², of which none may be told."""
+@pytest.mark.parametrize("damper", [0.0, 0.01])
+def test_what_a_spring_presses_against_its_stop_rests_from_the_start(damper):
+    """In a step of 1 ms its 0.3 N m give 0.3 rad/s to 1e-3 kg m², of which none may be told.
+
+    Nor may the damper, which would take 0.01 N m s of a mean square of 0.15² / 3 for 5 s: 4e-4 J.
+    """
     recording = run(
-        inertia=1e-3, spring=0.3, rest_deg=57.3, stops_deg=[-80.0, 0.0], gravity=0.0,
-        run={"until": 0.1},
+        inertia=1e-3, spring=0.3, rest_deg=57.3, stops_deg=[-80.0, 0.0], gravity=0.0, damper=damper,
+        run={"until": 5.0},
     )  # fmt: skip
-    assert np.abs(recording.swings["rate"]).max() < 1e-5 * 0.3
+    assert np.abs(recording.swings["rate"]).max() < 1e-3 * 0.3
     assert np.abs(recording.swings["angle"]).max() < 1e-15
+    assert abs(recording.ledger.damper_loss) < 1e-10
+    assert np.abs(recording.stopped).max() < 1e-10
 
 
 def balls(left, right, **more):

@@ -25,6 +25,9 @@ static Mover *hinge_of(const Contact *c) { return W.movers + c->hung - 1; }
 
 static int is_hinge(const Mover *m) { return m->inertia > 0; }
 
+/* Whether a stop acts on it in this step. */
+static int is_stopped(const Mover *m) { return m->solved && (m->impulse[0] != 0 || m->impulse[1] != 0); }
+
 /* Angular impulse that a contact's impulses take from its hinge, N m s. */
 static double moment_of(const Contact *c, const double *J) {
     return J[0] * c->lever[0] + J[1] * c->lever[1] + J[2] * c->lever[2];
@@ -95,7 +98,8 @@ void set_hinge(Mover *m, double t) {
     m->t = t;
 }
 
-/* Move a hinge along its path up to t, and begin a new path. Its damper takes the integral of damper rate^2. */
+/* Move a hinge along its path up to t, and begin a new path. Its damper takes the integral of damper rate^2. If a stop
+   holds it in this step, its motion is a hop: what the damper takes of that, the stop has given and gets back. */
 static void advance_hinge(Mover *m, double t) {
     double h = t - m->since, lost = 0, change, power;
     const double *a = m->path;
@@ -105,7 +109,7 @@ static void advance_hinge(Mover *m, double t) {
         for (int n = 1; n < k; n++) power *= h;
         for (int j = 1; j < TERMS; j++, power *= h) lost += k * a[k] * j * a[j] * power * h / (k + j - 1);
     }
-    m->damped += m->damper * lost;
+    *(is_stopped(m) ? &m->stopped : &m->damped) += m->damper * lost;
     double was = m->angle;
     follow_path(m, h, &m->angle, &m->rate, &change);
     m->pushed += m->torque * (m->angle - was);
@@ -292,8 +296,11 @@ void leave_hinges(double t) {
     }
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!is_hinge(m)) continue;
+        /* What is told is the state after the share of the impulses that belongs to the step before. */
         book_hinge(m, 0, 1);
+        book_hinge(m, W.before, -1);
         note(m, t, m->before + W.before * (m->rate - m->before));
+        book_hinge(m, W.before, 1);
         m->solved = 1;
         m->struck = 0;
         lay_path(m);

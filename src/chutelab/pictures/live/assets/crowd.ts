@@ -58,7 +58,9 @@ function crowdOf(
   const places = come.map(({ x }) => x).sort((a, b) => a - b);
   const mean = places.reduce((sum, x) => sum + x, 0) / places.length;
   const squares = places.reduce((sum, x) => sum + (x - mean) ** 2, 0);
-  const work = recording.ledger(end).belt_work;
+  const { belt_work, start } = recording.ledger(end);
+  // Without drives it is rounding.
+  const work = Math.abs(belt_work) > 1e-12 * start ? belt_work : 0;
   const names = [...machine.surfaces, "particles"];
   const losses = (books ?? []).map(([, restitution, friction], row) =>
     [names[row], restitution + friction] as [string, number]);

@@ -91,6 +91,15 @@ def test_pictures_load_no_engine_and_no_pyplot(tmp_path):
     assert not loaded & {"pymunk", "scipy", "rich", "matplotlib.pyplot"}
 
 
+def test_a_scene_with_sizes_in_words_needs_no_whole_schema():
+    code = (
+        "from chutelab.scene import load, overrides; load('galton'); load('coal-transfer');"
+        "made = overrides._schema.cache_info().currsize; load('galton', 'gravity=1.6 m/s²');"
+        "print(made, overrides._schema.cache_info().currsize)"
+    )
+    assert python("-c", code).stdout == "0 1\n"
+
+
 def test_importing_the_package_loads_nothing():
     code = f"import sys, chutelab; print([n for n in {sorted(EVERYTHING)!r} if n in sys.modules])"
     assert python("-c", code).stdout == "[]\n"

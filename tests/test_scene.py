@@ -12,7 +12,9 @@ import pytest
 from pydantic import ValidationError
 
 from chutelab import scene as sc
-from chutelab.scene.schema import to_dict
+from chutelab.scene.overrides import limits_of, rule_at, sized, unit_of
+from chutelab.scene.schema import TABLES, SceneTables, to_dict
+from chutelab.scene.units import UNITS, size_in
 
 CONVEYOR = """
 [incoming]
@@ -469,6 +471,18 @@ def test_texts_take_units(text, path, value):
     for part in path:
         found = getattr(found, part)
     assert found == value
+
+
+def test_every_key_of_a_table_takes_numbers_with_its_own_unit_alone():
+    """What the tables tell of units is what the whole schema says, at every key."""
+    texts = [f"2 {unit}".strip() for unit in (*UNITS, "kg/m³", "N m", "miles")]
+    for table, model in (("", SceneTables), *TABLES.items()):
+        for name, field in model.model_fields.items():
+            path = (table, field.alias or name) if table else (field.alias or name,)
+            takes = limits_of(rule_at(path) or {}) is not None
+            for text in (*texts, "2 balls and 3"):
+                number = size_in(text, unit_of(path)) if takes else None
+                assert sized(text, path) == (text if number is None else number), (path, text)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,6 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final
 
-import tomli_w
 from pydantic import ValidationError
 
 from chutelab.scene.conflicts import JOINTS, ConflictError, Look, conflicts
@@ -387,6 +386,8 @@ def to_toml(scene: Scene, comment: str = "") -> str:
     >>> parse(to_toml(scene)).plate == scene.plate
     True
     """
+    import tomli_w
+
     tables = to_dict(scene)
     tables.pop("expect", None)
     # tomli-w writes a line for each number of a list; texts contain no raw line breaks.

@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import inf, nextafter
+from math import inf, isnan, nextafter
 from typing import Any, Final
 
 from pydantic import BaseModel
@@ -20,8 +20,8 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from chutelab.scene.conflicts import EITHER
-from chutelab.scene.schema import SceneTables, to_dict
-from chutelab.scene.units import WORDS, size_in
+from chutelab.scene.schema import TABLES, SceneTables, to_dict
+from chutelab.scene.units import WORDS, read_any, size_in
 from chutelab.util.errors import MISSING, Fault, InputError, printable
 
 
@@ -229,11 +229,30 @@ def sized(value: Any, path: Sequence[str | int] = ()) -> Any:
             return {key: sized(content, (*path, key)) for key, content in value.items()}
         case list():
             return [sized(item, (*path, index)) for index, item in enumerate(value)]
-        case str() if path and value[:1] in "+-.0123456789":
+        case str() if path and value[:1] in "+-.0123456789" and _has_unit_of(value, path):
             if limits_of(rule_at(path) or {}) is not None:
                 size = size_in(value, unit_of(path))
                 return value if size is None else size
     return value
+
+
+def _has_unit_of(text: str, path: Sequence[str | int]) -> bool:
+    """Whether a text may be a number with the unit of the key at a path.
+
+    Keys of tables tell their units themselves: the whole schema, which takes a tenth of a short
+    command, is made only for a text that has the unit.
+    """
+    (number, unit), keys = read_any(text), [part for part in path if isinstance(part, str)]
+    table: type[BaseModel] | None = SceneTables
+    if len(keys) > 1:
+        table = TABLES.get(keys[0]) if len(keys) == 2 else None
+    if isnan(number) or table is None:
+        return not isnan(number)
+    for name, field in table.model_fields.items():
+        if (field.alias or name) == keys[-1]:
+            extra = field.json_schema_extra
+            return unit == ((isinstance(extra, dict) and extra.get("x-unit")) or "%")
+    return False
 
 
 def value_of(text: str) -> object:

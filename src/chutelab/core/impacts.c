@@ -6,9 +6,11 @@
 /* With this restitution, JAM impacts halve the normal velocity; with a larger one they don't jam a disk. */
 #define LASTING 0.9914
 /* Overlap, in radii, that a slow approach of supported particles may reach by the end of the step: such an approach is
-   left to the next step, as an impact on a pile causes impacts without end. For corners the overlap is larger, and the
+   left to the next step, as an impact on a pile causes impacts without end. The next solve removes as much at once, see
+   touching.c. One that is deeper already may become deeper by MORE. For corners it is always LATE_CORNERS, and the
    approach may be faster, up to LATEST: an impact of boxes is passed on four times as often. */
-#define LATE 1e-3
+#define LATE 5e-3
+#define MORE 1e-3
 #define LATE_CORNERS 2e-3
 
 /* ------------------------------------------------------------------ the next event of each disk */
@@ -95,17 +97,18 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     return MAX(least, MIN(skip, most));
 }
 
-/* Approach up to which two particles of a crowd, of which one is supported, are left to the next step at t, m/s: they may
-   overlap by no more than `overlap` by its end, see LATE. */
+/* Approach up to which two particles of a crowd, of which one is supported, are left to the next step at t, m/s: until the
+   end of the step they may approach by `overlap`, see LATE. */
 static double left_late(const Disk *a, const Disk *b, double overlap, double most, double t) {
     if (!W.interact || !(a->supports || b->supports) || !(t < W.step_end)) return 0;
     return MIN(most, overlap / (W.step_end - t));
 }
 
-/* Approach up to which two disks are left to the next step at t, m/s. */
-static double left_between(const Disk *a, const Disk *b, double radius, int sunk, double t) {
+/* Approach up to which two disks are left to the next step at t, where their gap is negative if they overlap, m/s. */
+static double left_between(const Disk *a, const Disk *b, double radius, double gap, double t) {
+    int sunk = gap < -SUNK * radius;
     double least = left_over(a, MAX(a->impacts, b->impacts), -1, radius, sunk);
-    return sunk ? least : MAX(least, left_late(a, b, LATE * radius, W.soft, t));
+    return sunk ? least : MAX(least, left_late(a, b, MAX(LATE * radius + MIN(gap, 0), MORE * radius), W.soft, t));
 }
 
 /* The same for two particles of which one has corners. */
@@ -143,8 +146,8 @@ static void foresee_pair(int i, int j, double *due, int *partner) {
     double small = MIN(a->radius, b->radius), reach = a->radius + b->radius;
     double t = W.now + meet_disk(x, y, u, v, reach, W.step_end - W.now, &approach);
     if (!(t < *due && t < W.step_end)) return;
-    int sunk = x * x + y * y < square(reach - SUNK * small);
-    if (approach > left_between(a, b, small, sunk, t)) {
+    double gap = t > W.now ? 0 : sqrt(x * x + y * y) - reach;
+    if (approach > left_between(a, b, small, gap, t)) {
         *due = t;
         *partner = j;
     }
@@ -716,7 +719,7 @@ static int struck_too(const Contact *c, double t, int *j) {
     double x = a->x - b->x, y = a->y - b->y, d = sqrt(x * x + y * y), r = MIN(a->radius, b->radius);
     double approach = -(x * (a->vx - b->vx) + y * (a->vy - b->vy)) / d;
     return d < a->radius + b->radius + TOUCH * r
-        && approach > left_between(a, b, r, d < a->radius + b->radius - SUNK * r, t);
+        && approach > left_between(a, b, r, d - a->radius - b->radius, t);
 }
 
 static void enqueue(int i, int *tail) {

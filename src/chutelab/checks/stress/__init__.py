@@ -40,6 +40,7 @@ from chutelab.checks.stress.barriers import (
     worst,
 )
 from chutelab.machine import Segments
+from chutelab.results import laws
 from chutelab.results.ledger import energy_at, ledger
 
 __all__ = ["A_CONTACT", "EPS", "LAWS", "ROUNDINGS", "Evidence", "Verdict", "judge"]
@@ -235,7 +236,8 @@ def of_every_run(e: Evidence) -> Verdict:
 
     Among them are those of hinges, of particles with corners, and of each step's solution.
     """
-    return Verdict(len(e.recording.laws), 0.0, next((one.told for one in e.recording.laws), "laws"))
+    broken = laws.judge(e.recording)
+    return Verdict(len(broken), 0.0, next((one.told for one in broken), "laws"))
 
 
 UNSEEN = ("laws of every run", "nothing through", "nothing through another")

@@ -47,22 +47,23 @@ static inline void transpose(Four *v) {
 }
 
 /* Load x, y and rim of the bodies of four rows. */
-static inline void gather(const int *which, Four *v) {
-    for (int k = 0; k < 4; k++) v[k] = get(&W.light_bodies[which[k]].x);
+static inline void gather(const LightBody *from, const int *which, Four *v) {
+    for (int k = 0; k < 4; k++) v[k] = get(&from[which[k]].x);
     transpose(v);
 }
-static inline void scatter(const int *which, Four *v) {
+static inline void scatter(LightBody *to, const int *which, Four *v) {
     v[3] = all(0);
     transpose(v);
-    for (int k = 0; k < 4; k++) set(&W.light_bodies[which[k]].x, v[k]);
+    for (int k = 0; k < 4; k++) set(&to[which[k]].x, v[k]);
 }
 
-/* `give` of rows.c for four rows; `rolls` and `cornered` are true if they are for any row of all. */
-static inline Four give(SolverFour *f, int rolls, int cornered) {
+/* `give` of rows.c for four rows; `rolls` and `cornered` are true if they are for any row of all. Each loop over it has a
+   copy of its own, in which both are known. */
+static inline __attribute__((always_inline)) Four give(SolverFour *f, LightBody *body, int rolls, int cornered) {
     const LeverFour *l = W.lever_fours + (cornered ? f - W.fours : 0);
     Four a[4], b[4], nx = get(f->nx), ny = get(f->ny), J = get(f->impulse), T = get(f->along), mass = get(f->mass);
-    gather(f->a, a);
-    gather(f->b, b);
+    gather(body, f->a, a);
+    gather(body, f->b, b);
     Four x = less(a[0], b[0]), y = less(a[1], b[1]);
     Four opens = sum(sum(by(x, nx), by(y, ny)), get(f->opens));
     Four turn = sum(a[2], b[2]);
@@ -104,8 +105,8 @@ static inline Four give(SolverFour *f, int rolls, int cornered) {
     b[0] = less(b[0], by(get(f->mass_b), px));
     b[1] = less(b[1], by(get(f->mass_b), py));
     b[2] = sum(b[2], rb);
-    scatter(f->a, a);
-    scatter(f->b, b);
+    scatter(body, f->a, a);
+    scatter(body, f->b, b);
     return change;
 }
 
@@ -144,15 +145,15 @@ static inline int hasten(int age, int rolls) {
 
 /* `sweep_rows` of rows.c. */
 static inline double sweep(int sweeps, int plain, double accurate, double most, int rolls, int cornered) {
+    LightBody *const body = W.light_bodies;
     double worst = 0;
     int age = 0;
     for (int n = 0; n < sweeps; n++) {
         Four change = all(0);
         if (n >= plain && (n - plain) % 2 == 0) age = hasten(n == plain ? 0 : age, rolls);
-        if ((sweeps - n) % 2)
-            for (SolverFour *f = W.fours; f < W.fours + fours; f++) change = high(change, give(f, rolls, cornered));
-        else
-            for (SolverFour *f = W.fours + fours - 1; f >= W.fours; f--) change = high(change, give(f, rolls, cornered));
+        int way = (sweeps - n) % 2 ? 1 : -1;
+        SolverFour *f = W.fours + (way > 0 ? 0 : fours - 1);
+        for (int left = fours; left > 0; left--, f += way) change = high(change, give(f, body, rolls, cornered));
         worst = greatest(change);
         W.sweep_count++;
         if (worst <= accurate) return worst;

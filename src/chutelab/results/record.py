@@ -39,7 +39,6 @@ ENGINES = ("exact", "contact", "pymunk")
 PARTICLES = "particles"
 """Name under which the losses of particle-particle contacts are booked."""
 
-
 QUANTILES = (0.02, 0.5, 0.98)
 """Quantiles of a stream at one edge, in the middle and at the other edge."""
 
@@ -99,7 +98,6 @@ KNOT = np.dtype([
 - ``entries``: of the energy ledger of this particle since its release, J, see `ENTRIES`.
 """
 
-
 TOTAL = np.dtype([("t", "f8"), ("kinetic", "f8"), ("potential", "f8"), ("entries", "f8", 3)])
 """Sums over all released particles of a crowd at the beginning of a step, in SI units.
 
@@ -109,7 +107,6 @@ TOTAL = np.dtype([("t", "f8"), ("kinetic", "f8"), ("potential", "f8"), ("entries
   tracks.
 - ``entries``: of the energy ledger, J, see `ENTRIES`.
 """
-
 
 LOAD = np.dtype([
     ("normal", "f8"), ("along", "f8"), ("force", "f8", 2), ("moment", "f8"), ("at", "f8", 2)
@@ -123,16 +120,14 @@ LOAD = np.dtype([
 - ``at``: sum of contact points times their normal impulses, N m s.
 """
 
-
 LASTING = np.dtype([
     ("particle", "i4"), ("other", "i4"), ("from", "f8"), ("to", "f8"), ("impulse", "f8", 2),
     ("stress", "f8", (2, 2)),
 ])  # fmt: skip
 """Impulse of a lasting contact on a particle between two times, in SI units.
 
-Impulses of impacts at one instant that were solved together are recorded here, too: their events
-have the change of momentum of all of them, not only that of the event's own impulse.
-
+Those of impacts at one instant that were solved together are here, too: their events have the
+change of momentum of all of them.
 
 - ``other``: the other particle, which got the opposite impulse; or -1 less the index of a surface.
 - ``impulse``: J, N s.

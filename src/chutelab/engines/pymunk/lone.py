@@ -143,7 +143,8 @@ class Lone:
         self.faces, self.changes, self.shut = world.faces, inf, set[Face]()
         if world.gates:
             self.faces = [face for face in world.faces if face.appears <= self.t < face.vanishes]
-        self.steps, self.last = 0, 0.0
+        # The length of the last step, and whether Chipmunk keeps impulses of a contact.
+        self.steps, self.last, self.solved = 0, 0.0, False
         self.blows, self.struck = 0, -inf
 
     def run(self) -> None:
@@ -220,12 +221,13 @@ class Lone:
         body, space = self.body, self.world.space
         for face in self.restitution:
             face.put(x + h * v)
-        if h != self.last:
-            # Chipmunk starts from the impulses of the last step, which is right only for a step of
+        if h != self.last and self.solved:
+            # Chipmunk starts from the impulses that it keeps, which is right only for a step of
             # equal length.
             space.remove(self.circle)
             space.add(self.circle)
-            self.last = h
+            self.solved = False
+        self.last = h
         body.position, body.velocity, body.angular_velocity = x, v, omega
         space.gravity, self.contacts = g, []
         space.iterations = WEDGED if len(self.restitution) > 1 else 1
@@ -266,6 +268,7 @@ class Lone:
         restitution = self.restitution.get(face)
         arbiter.process_collision = restitution is not None
         if restitution is not None:
+            self.solved = True
             arbiter.restitution, arbiter.friction = restitution, face.friction
             if not face.turns and face.speed != 0.0:
                 arbiter.surface_velocity = face.belt(normal) * Vec2d(normal.y, -normal.x)

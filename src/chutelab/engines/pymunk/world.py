@@ -23,7 +23,7 @@ PARTICLE, SURFACE = 1, 2
 """Collision types of disks and of everything they meet."""
 
 GRIP = 1e9
-"""Friction coefficient that stands for inf, which Chipmunk would multiply with an impulse of 0."""
+"""Friction coefficient for inf, which Chipmunk would multiply with an impulse of 0."""
 
 HAIR = 2e-11
 """Share of the radius by which a disk in the Space is larger than the particle, so that Chipmunk
@@ -43,11 +43,9 @@ SHORT = 1e-5
 """Share of a step: a shorter contact has ended, and a surface just left is checked again after this
 time."""
 
-
 JOINT = 0.0625
-"""In hairs. Where another piece continues an arc, the arc is made longer by this, so that a
-particle that slides onto it touches both. However both bend, the particle is then at most 4 times
-this deep in the arc, less than the depth at which a step ends because a surface is met."""
+"""In hairs, by which an arc is longer where another piece continues it: what slides onto it touches
+both. It is then at most 4 times this deep in the arc, and no step ends for that."""
 
 ALIKE = 1e-9
 """Directions (rad) and curvatures (relative) that differ by less count as equal."""
@@ -60,10 +58,7 @@ NONE = (Vec2d.zero(), Vec2d.zero())
 
 
 def direction(begin: Vec2d, end: Vec2d) -> Vec2d:
-    """Return the unit vector from one place to another, 0 if they are one.
-
-    In plain numbers, as operators of Vec2d take ten times as long.
-    """
+    """Return the unit vector from one place to another, 0 if they are one."""
     (x, y), (u, v) = begin, end
     x, y = u - x, v - y
     far = sqrt(x * x + y * y) or 1.0
@@ -109,19 +104,14 @@ class Face:
         """Prepare for contact with a particle at a place (m)."""
 
     def gap(self, x: Vec2d) -> tuple[float, Vec2d]:
-        """Return the gap (m) between the surface and a disk round a point, and the normal there.
-
-        Closer than 1e-5 m Chipmunk returns the segment's own normal, on either side.
-        """
+        """Return the gap (m) between the surface and a disk round a point, and the normal there."""
         found = self.shape.point_query(x)
+        # Closer than 1e-5 m Chipmunk returns a segment's own normal, on either side.
         normal = found.gradient if self.tangent is None else direction(found.point, x)
         return found.distance - self.radius, normal
 
     def side(self, x: Vec2d) -> float:
-        """Return the distance to the solid side (m), negative on the other; 0 if both are solid.
-
-        Beyond an end it is measured from the straight continuation.
-        """
+        """Return the distance to the solid side (m), negative on the other; 0 if both are solid."""
         if not self.one_sided or self.tangent is None or self.shape.body is None:
             return 0.0
         away = x - self.shape.point_query(x).point
@@ -156,8 +146,8 @@ class Face:
 class Bend(Face):
     """An arc, met from inside and outside, or a whole circle; the ends of an arc are other faces.
 
-    Chipmunk has no concave shape. Its distance query on the circle gives the gap on either side.
-    For contact the disk gets a point to lie on, placed where the circle is nearest.
+    Chipmunk has no concave shape: its distance query on the circle gives the gap on either side,
+    and a disk lies on a point, placed where the circle is nearest.
     """
 
     foot: pymunk.Circle  # without radius, on a body of its own
@@ -190,11 +180,9 @@ class Bend(Face):
         self.foot.body.position = away if beside else onto
 
     def outward(self, x: Vec2d) -> Vec2d:
-        """Return the direction of a place from the centre.
-
-        Closer to the centre than 1e-5 m Chipmunk returns a fixed direction.
-        """
+        """Return the direction of a place from the centre."""
         center = self.center
+        # Closer than 1e-5 m Chipmunk returns a fixed direction.
         return direction(center, x) if x != center else Vec2d(0.0, 1.0)
 
     def gap(self, x: Vec2d) -> tuple[float, Vec2d]:
@@ -226,9 +214,8 @@ class Bend(Face):
     ) -> float:
         """Return a time (s) within which it cannot be met; for the outside see `Face.free`.
 
-        Beside an arc it is the time to a line through the centre and an end. Inside, with c from
-        the centre to the place, ρ² - c² starts at the gap times ρ + c, has the rate -2 c·v and the
-        second derivative -2 (v² + c·a), which is bounded for a path of some ρ.
+        Beside an arc until a line through the centre and an end. Inside, c away from the centre,
+        ρ² - c² begins at the gap times ρ + c, at the rate -2 c·v, and bends by -2 (v² + c·a).
         """
         away = x - self.center
         if gap == inf:
@@ -295,10 +282,9 @@ def falls(gap: float, rate: float, pull: float) -> float:
 class World:
     """A Space with all surfaces of a machine, relative to `recorder.origin`.
 
-    `faces` are its segments, in their order, the pulley, the arcs and their ends, as one particle
-    meets them; `gates` says whether some do not always exist. Gaps up to `hair` (m) are contact,
-    and gaps of `rounding` (m) count as 0. `tiny` is the share of speeds below which a normal
-    velocity is rounding, because normals are tilted by rounding.
+    `faces` are its segments, in order, the pulley, the arcs and their ends, as one particle meets
+    them; `gates` says whether some do not always exist. Gaps up to `hair` (m) are contact, those of
+    `rounding` (m) are 0. `tiny` is the share of speeds that tilted normals make by rounding.
     """
 
     def __init__(self, machine: Machine, particle: int = 0) -> None:
@@ -369,8 +355,9 @@ class World:
         # rad; extension of the arc at an end, see `JOINT`, for the sharpest arc.
         more = sqrt(2.0 * JOINT * self.hair * float(arcs.radius.min())) / (radius + self.radius)
         # Whether another piece continues from the end, turning by less than that.
+        _, ways, _ = self._onward
         before, after = (
-            more if (np.hypot(*(self._from(end.tolist())[0] + inward).T) <= more).any() else 0.0
+            more if (np.hypot(*(ways[self._from(end.tolist())] + inward).T) <= more).any() else 0.0
             for end, inward in ends
         )
         self._add(Bend(
@@ -404,24 +391,23 @@ class World:
         order = ends[:, 0].argsort(kind="stable")
         return ends[order].tolist(), ways[order], bends[order]
 
-    def _from(self, end: Sequence[float]) -> tuple[Floats, Floats]:
-        """Return the continuations, as in `_onward`, into all pieces that end at a place (m)."""
-        (ends, ways, bends), (x, y) = self._onward, end
+    def _from(self, end: Sequence[float]) -> list[int]:
+        """Return which pieces, of `_onward`, end at a place (m)."""
+        ends, (x, y) = self._onward[0], end
         low, high = (bisect_left(ends, [x + share * self.hair]) for share in (-1.0, 1.01))
-        near = [n for n in range(low, high) if dist(ends[n], (x, y)) <= self.hair]
-        return ways[near], bends[near]
+        return [n for n in range(low, high) if dist(ends[n], (x, y)) <= self.hair]
 
     def _crown(self, end: Sequence[float], out: Vec2d, bend: float = 0.0) -> Vec2d:
         """Return the direction to the middle of the rim that continues a left side.
 
-        It is the left side seen outward from a piece, which has the curvature `bend` (1/m)
-        backward. At a free end the direction is the left normal. Where other pieces end, a disk
-        rolls round the end only in an angle of more than π between two pieces; all of that rim
-        continues the faces of both.
+        Left as seen outward from a piece, which has the curvature `bend` (1/m) backward. At a free
+        end it is the left normal. Where other pieces end, a disk rolls round the end only in an
+        angle of more than π between two; all of that rim continues the faces of both.
         """
-        ways, bends = self._from(end)
-        if len(ways) == 1:
+        near = self._from(end)
+        if len(near) == 1:
             return out.perpendicular()
+        ways, bends = (each[near] for each in self._onward[1:])
         dots, crosses = ways @ -np.array(out), ways[:, 0] * out.y - ways[:, 1] * out.x
         turns, curls = np.arctan2(crosses, dots), bends - bend
         alike = np.abs(turns) <= ALIKE
@@ -471,10 +457,9 @@ class World:
     ) -> float:  # fmt: skip
         """Return the time (s) at which a disk on a path meets a surface, inf if not within `span`.
 
-        It advances by times within which nothing can be met, see `Face.free`. That never passes a
-        contact, and converges like Newton's method. A surface that is left along its tangent gives
-        no bound; it is checked after times that grow by half. `near` is its gap and normal at the
-        beginning, if known.
+        It advances by times within which nothing can be met, see `Face.free`, and converges like
+        Newton's method. A surface that is left along its tangent is checked after times that grow
+        by half. `near` is its gap and normal at the beginning, if known.
         """
         r, g, hair = face.radius, self.machine.gravity, self.hair
         t = last = begin
@@ -499,7 +484,7 @@ class World:
                 tau = max(tau, min(0.5 * t + SHORT * self.machine.dt, r / speed))
             if t + tau == t:
                 return t
-            if t == span:
+            if t == span or (not leaving and t + tau > span):
                 return inf
             last, t = t, min(t + tau, span)
 
@@ -532,8 +517,7 @@ class Carriage:
     """Ride of one particle at the belt's speed, without rotation, at its height of release.
 
     It begins at `t` (s), comes to the pulley at `top`, at the angle -β from the top, and lasts
-    `until` separation: there if v² ≥ g ρ cos β, else at cos φ1 = v²/(g ρ); or until another surface
-    is met; or to the end of the run.
+    `until` separation, there if v² ≥ g ρ cos β, else at cos φ1 = v²/(g ρ); a surface; or the end.
     """
 
     def __init__(self, machine: Machine, world: World, particle: int, t: float) -> None:

@@ -11,6 +11,7 @@ The fate of a particle is its place when its track ends, or the way by which it 
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -38,8 +39,10 @@ HALVINGS = 24
 """Bisections between two such times to find when a contact began."""
 
 
-def fates(recording: Record) -> NDArray[Any]:
+def fates(recording: Record, which: Bools | None = None) -> NDArray[Any]:
     """Return the fate of each particle, in words, (N,).
+
+    With `which`, (N,), only of these if particles do not meet; of others it is "unreleased".
 
     ``on NAME``
         It touches a surface when its track ends, or lies on particles that do, or is carried by it
@@ -56,10 +59,13 @@ def fates(recording: Record) -> NDArray[Any]:
     """
     machine, count = recording.machine, recording.count
     said = np.full(count, "unreleased", dtype=object)
-    particles = np.flatnonzero(recording.released)
+    asked = recording.released
+    if which is not None and not machine.interact:
+        asked = asked & which
+    particles = np.flatnonzero(asked)
     if not len(particles):
         return said
-    last = recording.ends()[1]
+    last = recording.knots.take(recording.offsets[particles + 1] - 1)
     left, bottom, right, top = machine.releases.exit_box[particles].T
     (x, y), out = last["position"].T, recording.ended_by("exit")[particles]
     gone = out | (x < left) | (x > right) | (y < bottom) | (y > top)
@@ -224,18 +230,29 @@ class Places:
     def __init__(self, recording: Record) -> None:
         self.recording = recording
         self.radius = recording.radius
-        knots, corners = recording.knots, recording.machine.corners
+        knots = recording.knots
         self._pieces: dict[int, list[Pieces]] = {}
         self._movers = {mover.surface: mover for mover in recording.machine.movers}
         self._cornered = np.zeros(recording.count, dtype=bool)
         for kind, outline in enumerate(recording.machine.outlines):
             if outline is not None:
                 self._cornered |= recording.machine.releases.kind == kind
-        size = np.ptp(corners, axis=-2).max(axis=-1) if corners.size else 0.0
-        self._point = np.broadcast_to(POINT * size, recording.count)
         self._t0 = float(knots["t"].min(initial=0.0))
         self._span = 2.0 * (float(knots["t"].max(initial=0.0)) - self._t0) + 1.0
-        self._keys = recording.owner * self._span + (knots["t"] - self._t0)
+
+    @cached_property
+    def _keys(self) -> Floats:
+        """A number for each knot that rises from particle to particle, and along each track."""
+        return self.recording.owner * self._span + (self.recording.knots["t"] - self._t0)
+
+    @cached_property
+    def _touch(self) -> Floats:
+        """Gap up to which each particle touches a surface, (N,), m."""
+        near = self.radius * (1.0 + TOUCH)
+        if not self.radius.all() and (corners := self.recording.machine.corners).size:
+            size = np.ptp(corners, axis=-2).max(axis=-1)
+            near = np.where(self.radius > 0.0, near, POINT * size)
+        return near
 
     def _cells(self, particles: Ints, t: Any, side: Any = "right") -> tuple[Ints, Floats]:
         """Return the interval of each track that holds t, and the share of it that has passed."""
@@ -311,9 +328,7 @@ class Places:
             piece = piece if self.recording.family is None else piece.of(particles)
             gap = np.where(piece.there(t), np.minimum(gap, piece.gap(written)), gap)
         radius = self.radius[particles]
-        found = np.asarray(
-            gap <= np.where(radius > 0.0, radius * (1.0 + TOUCH), self._point[particles])
-        )
+        found = np.asarray(gap <= self._touch[particles])
         for n in np.flatnonzero(found & self._cornered[particles]).tolist():
             edges = self.edges(int(particles[n]), places[n], float(times[n]))
             found[n] = False

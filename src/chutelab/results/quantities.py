@@ -321,10 +321,11 @@ def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
     """
     events, each = recording.events, recording.count // len(holds)
     kinds = [int(kind) for kind in (Kind.SEPARATION, Kind.IMPACT, Kind.LANDING, *OTHER)]
+    if each > 1:
+        events = events.take((events["particle"] % each == 0).nonzero()[0])
     # Grip and slip on the belt and the pulley are in the equations.
     known = events["kind"] == Kind.STICK
     known &= events["surface"] == recording.surface_index("incoming")
-    known |= events["particle"] % each > 0
     order = (np.isin(events["kind"], kinds) & ~known).nonzero()[0]
     own = events.take(order[sorted_by(events["particle"][order], recording.count)])
     own["particle"] //= each
@@ -476,10 +477,12 @@ def measured(recording: Record, name: str) -> Floats:
                 # With one particle all statistics but the spread are its value.
                 return values - values if statistic == "spread" else values
             table, known = values.reshape(shape), (own & np.isfinite(values)).reshape(shape)
-            found, whole = np.full(many, nan), known.all(axis=1)
-            found[whole] = _STATISTICS[statistic](table[whole], axis=1)
-            for row in np.flatnonzero(known.any(axis=1) & ~whole).tolist():
-                found[row] = _STATISTICS[statistic](table[row][known[row]])
+            found, counts = np.full(many, nan), known.sum(axis=1)
+            # Variants in which as many particles have a value are rows of one table.
+            for n in np.unique(counts[counts > 0]).tolist():
+                some = counts == n
+                alike = table[some][known[some]].reshape(-1, n)
+                found[some] = _STATISTICS[statistic](alike, axis=1)
             return found
     return each(recording, name)[:: shape[1]]
 

@@ -151,7 +151,9 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
     restless = ~missed & (ended != REASONS.index("settled"))
     if recording.machine.until != "settled":
         restless[:] = False
-    ways = fates(recording).reshape(missed.shape) if every > 1 and missed.any() else missed
+    ways = missed
+    if every > 1 and missed.any():
+        ways = fates(recording, missed.ravel()).reshape(missed.shape)
     for row in np.flatnonzero((missed | restless).any(axis=1)).tolist():
         fate = FATES.get(REASONS[ended[row, 0]])
         if every > 1 and missed[row].any():
@@ -221,11 +223,10 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
         if len(surfaces) > LONGEST:
             surfaces[LONGEST - 1 :] = ["and so on"]
         names[n] = ", ".join(surfaces) or NOTHING
-    if recording.count == variants:
-        texts: NDArray[Any] = names[taken]
-        return texts
-    texts = np.empty(variants, dtype=object)
-    for row, taken_here in enumerate(taken.reshape(variants, -1).tolist()):
+    table = taken.reshape(variants, -1)
+    texts, alike = names[table[:, 0]], (table == table[:, :1]).all(axis=1)
+    for row in np.flatnonzero(~alike).tolist():
+        taken_here: list[int] = table[row].tolist()
         counts = Counter(taken_here).most_common()
         often = [names[way] for way, count in counts if count > RARE * len(taken_here)]
         texts[row] = " | ".join(often or [names[counts[0][0]]])

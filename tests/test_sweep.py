@@ -70,6 +70,16 @@ def block_of(scene, varies, **options):
 ROUNDING = {"error.max": 1e-12, "ledger.residual": 1e-15}
 """What is an error itself agrees absolutely: relative, and in J."""
 
+ALIKE = 1e-14
+"""Share of their mean by which values of particles may differ, and so the spread of like ones."""
+
+
+def rounding_of(name, expected):
+    if name.endswith(".spread"):
+        means = np.abs(expected[name.replace(".spread", ".mean")])
+        return ALIKE * np.nanmax(means, initial=0.0)
+    return ROUNDING.get(name, 0.0)
+
 
 def assert_same(found, expected):
     assert list(found) == list(expected)
@@ -78,8 +88,9 @@ def assert_same(found, expected):
             assert found[name].tolist() == expected[name].tolist()
         else:
             np.testing.assert_allclose(
-                found[name], expected[name], rtol=1e-12, atol=ROUNDING.get(name, 0.0), err_msg=name
-            )
+                found[name], expected[name], rtol=1e-12, atol=rounding_of(name, expected),
+                err_msg=name,
+            )  # fmt: skip
 
 
 # the batch against single runs -------------------------------------------------------------------

@@ -390,8 +390,10 @@ void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
     double facing = sign_of(c->rho), rho = c->rho;
     for (int way = 0; way < 2; way++)
         found[way] = (Bound){ way ? INFINITY : -INFINITY, NONE, 0, 0, NONE };
+    double reach = fabs(rho);
+    Box box = { { c->x - reach, c->y - reach }, { c->x + reach, c->y + reach } };
     for (int k = 0; k < O.faces; k++)
-        for (int n = 0; n < 2; n++) {
+        for (int n = 0; n < 2 && is_near(&box, O.all + k); n++) {
             const Obstacle *o = O.all + k;
             int face = n ? -1 : 1;
             /* The gap to a face is rho (cos(phi - tilt) - level). */
@@ -433,7 +435,7 @@ void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
         const Obstacle *o = O.all + k;
         /* The gap to a circle grows with -cos(phi - tilt). */
         double x = o->x - c->x, y = o->y - c->y, distance = length_of(x, y);
-        if (k == circle || !(distance > O.touch) || is_beside(circle, k, 0)) continue;
+        if (k == circle || !is_near(&box, o) || !(distance > O.touch) || is_beside(circle, k, 0)) continue;
         double level = (rho * rho + distance * distance - o->rho * o->rho) / (2.0 * rho * distance);
         if (!(fabs(level) < 1.0)) continue;
         double half = angle_of_cosine(level), tilt = angle_of(x, y);

@@ -15,13 +15,16 @@
 #include "exact.h"
 
 #define ORDER 20
-/* Bound on the last terms of a step, as a share of the speeds and of the load, and rad of the angle. */
+/* Bound on the last terms of a step, as a share of the speeds and of the load, and rad of the angle; and where tracks
+   may be less accurate. */
 #define LEFT_OUT 1e-16
+#define LOOSELY 1e-14
 /* Share of its first term by which a series must stay above 0, so that rounding can't make it negative. */
 #define SURELY 1e-9
 /* Newton steps towards the time of an event, the share of that time by which their result may be wrong, and bisections of
    the remaining interval, beyond the last bit. */
 #define STEPS 8
+#define SETTLED 1e-8
 #define NEAR (8.0 * ULP)
 #define HALVINGS 64
 
@@ -128,11 +131,12 @@ static void find_gauges(const Circle *c) {
 static double step_of(const Circle *c, double longest, int *parts) {
     double pace = fabs(c->w) + fabs(c->z) + fabs(c->belt) + sqrt(c->gravity * fabs(c->rho));
     double load = c->gravity + c->w * c->w / fabs(c->rho), dt = longest, bend = 0.0;
+    double least = E.loose > 0.0 ? LOOSELY : LEFT_OUT;
     for (int n = ORDER - 1; n <= ORDER; n++) {
         double share = fabs(phi[n]);
         if (pace > 0.0) share = MAX(share, MAX(fabs(w[n]), fabs(z[n])) / pace);
         if (load > 0.0) share = MAX(share, fabs(normal[n]) / load);
-        dt = MIN(dt, pow(LEFT_OUT / share, 1.0 / n));
+        dt = MIN(dt, pow(least / share, 1.0 / n));
     }
     /* A particle at rest has no bound on its step. */
     double finite = isfinite(dt) ? dt : 0.0, rates[4][ORDER];
@@ -159,13 +163,13 @@ static double step_of(const Circle *c, double longest, int *parts) {
 /* The time at which a series that is not negative at `low` and is at `high` becomes negative. Newton's method finds about
    where; if the sign changes there, little is left for bisection. */
 static double first_negative(const double *c, double low, double high) {
-    double t = 0.5 * (low + high);
+    double first = at_time(c, low), t = low + (high - low) * first / (first - at_time(c, high));
     for (int n = 0; n < STEPS && t > low && t < high; n++) {
         double value = 0.0, slope = 0.0;
         for (int k = ORDER; k >= 0; k--) slope = slope * t + value, value = value * t + c[k];
         double old = t;
         t -= value / slope;
-        if (t == old) break;
+        if (fabs(t - old) <= SETTLED * t) break;
     }
     double ends[] = { t - NEAR * t, t + NEAR * t };
     for (int n = 0; n < 2; n++) {

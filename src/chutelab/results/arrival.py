@@ -161,11 +161,11 @@ def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
 
 def never(count: int) -> NDArray[Any]:
     """Return events (count,) that did not happen: all NaN."""
-    events = np.zeros(count, dtype=EVENT)
+    event = np.zeros(1, dtype=EVENT)
     for name in EVENT.names or ():
         if EVENT[name].base.kind == "f":
-            events[name] = np.nan
-    return events
+            event[name] = np.nan
+    return event.repeat(count)
 
 
 @kept

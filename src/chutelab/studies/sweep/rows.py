@@ -194,9 +194,7 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
     the most frequent one first, such as ``plate, outgoing | outgoing``.
     """
     # Particles, and the surfaces that each meets up to its landing.
-    kind = recording.events["kind"]
-    some = (kind == Kind.IMPACT) | (kind == Kind.LANDING) | (kind == Kind.SETTLE)
-    order = some.nonzero()[0]
+    order = recording.which(Kind.IMPACT, Kind.LANDING, Kind.SETTLE)
     # Only needed columns are taken; whole rows are ten times as large.
     particle, surface, lands = (recording.events[name][order].astype(np.int64) for name in FIELDS)
     order = sorted_by(particle, recording.count)

@@ -88,14 +88,14 @@ def courses_of(recording: Recording) -> list[str]:
     each = recording.count // recording.variants
     touched: list[list[int]] = [[] for _ in range(recording.variants)]
     landed = [False] * recording.variants
-    events = recording.select(Kind.IMPACT, Kind.LANDING)
-    events = events[events["particle"] % each == 0]
-    events["particle"] //= each
-    columns = (events[name].tolist() for name in ("particle", "surface", "kind"))
+    events, some = recording.events, recording.which(Kind.IMPACT, Kind.LANDING)
+    some = some[events["particle"][some] % each == 0]
+    columns = (events[name][some].tolist() for name in ("particle", "surface", "kind"))
     for particle, surface, kind in zip(*columns, strict=True):
-        if not landed[particle]:
-            touched[particle].append(surface)
-            landed[particle] = kind == Kind.LANDING
+        variant = particle // each
+        if not landed[variant]:
+            touched[variant].append(surface)
+            landed[variant] = kind == Kind.LANDING
 
     @cache
     def course(surfaces: tuple[int, ...], end: str) -> str:

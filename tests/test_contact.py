@@ -15,7 +15,7 @@ from chutelab.checks.stress import Evidence, judge
 from chutelab.engines import exact
 from chutelab.engines.contact import run
 from chutelab.machine import build
-from chutelab.results import REASONS, Kind
+from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.ledger import ledger
 from cores import Core
 from crowds import crowd, hop_step
@@ -192,7 +192,7 @@ LAWS = (
 
 def faults(recording):
     """Return what a run did that no crowd may do."""
-    found = judge(Evidence(recording))
+    found = judge(Evidence(Recording.of(recording)))
     assert {"no overlap", "ledger closes"} <= {verdict.law for verdict in found}
     return [verdict for verdict in found if verdict.law in LAWS and not verdict.holds]
 

@@ -1,5 +1,6 @@
 """Boxes and polygons in the contact engine, by closed forms; and against Pymunk."""
 
+from dataclasses import replace
 from math import atan2, cos, degrees, hypot, pi, sin, tan
 
 import numpy as np
@@ -9,6 +10,7 @@ import chutelab
 from chutelab import SceneError
 from chutelab.engines import simulation
 from chutelab.machine import build
+from chutelab.results import laws
 from chutelab.scene import to_dict
 from shared import seeds
 
@@ -365,6 +367,35 @@ def test_a_box_that_lies_over_the_end_of_an_arc_is_on_its_inside_with_the_corner
     })  # fmt: skip
     lost = run.energy_at(np.arange(0.2, 0.519, step))
     assert np.diff(lost["restitution_loss"]).min() > -1e-7
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+@pytest.mark.parametrize("gap", [1e-4, 1e-3])
+def test_a_box_that_slides_into_a_bowl_over_its_end_stays_inside(friction, gap):
+    """Upright along the wall, it reaches out of the opening: its centre is outside the circle.
+
+    No corner is beyond the arc. Where the box is moved outwards, the law tells.
+    """
+    tables = scene((-0.09 + gap, 0.0815), angle=0.5 * pi, size=(0.16, 0.02), mu=friction)
+    bowl = {"center": [0.0, 0.0], "radius": 0.1, "from_deg": 180.0, "to_deg": 360.0}
+    tables["surface"] = [{"name": "bowl", "friction": friction, "restitution": 0.0, **bowl}]
+    recording = run(tables | {"run": {"until": 0.1}})
+
+    def beyond(recording):
+        now, far = recording.at(np.linspace(0.0, 0.1, 400)[1:-1]), []
+        for at, angle in zip(now.position[:, 0], now.angle[:, 0], strict=True):
+            x, y = (at + turned(corners(0.16, 0.02), angle)).T
+            far += [*np.hypot(x, y)[y < 0.0] - 0.1]
+        return max(far)
+
+    assert abs(beyond(recording)) < 1e-5
+    knots = recording.knots.copy()
+    knots["position"][knots["t"] > 0.07, 0] -= 0.008
+    moved = replace(recording, knots=knots)
+    (told,) = moved.laws
+    assert told.law == laws.INSIDE
+    # The end of the arc is less deep in the box than its corner is beyond the arc.
+    assert 0.004 < told.amount < beyond(moved) < 0.008
 
 
 @pytest.mark.parametrize(

@@ -346,30 +346,27 @@ static int corners_at(int knot, double share, double x, double y, const Barrier 
     return body->corners;
 }
 
-/* How far an edge of a particle, or a corner at its end, is on the other side of an arc, m. 0 if the edge doesn't cross
-   the arc, except where an end of the arc may be inside the edge. */
-static double across(const Barrier *b, const double *q, const double *r, int inside) {
+/* Add an edge of a particle to how far it is beyond an arc, m: outside the circle, and inside it. Only what is next to a
+   place where the edge crosses the arc counts, and not if the end of the arc may be inside the particle there. */
+static void add_edge(const Barrier *b, const double *q, const double *r, double *beyond) {
     double x = q[0] - b->x, y = q[1] - b->y, ex = r[0] - q[0], ey = r[1] - q[1];
     double a = ex * ex + ey * ey, half = x * ex + y * ey, root = half * half - a * (x * x + y * y - b->radius * b->radius);
-    int met = 0, both = 0;
-    for (int n = 0; n < 2 && root > 0; n++) {
-        double share = (-half + (n ? 1 : -1) * sqrt(root)) / a;
-        if (share < 0 || share > 1) continue;
-        both++;
-        met |= is_within(b, q[0] + share * ex, q[1] + share * ey, L.allowed);
+    for (int side = -1; side <= 1 && root > 0; side += 2) {
+        double share = (-half + side * sqrt(root)) / a;
+        if (share < 0 || share > 1 || !is_within(b, q[0] + share * ex, q[1] + share * ey, L.allowed)) continue;
+        /* Outside is an end of the edge; deepest inside the place nearest to the centre. */
+        const double *out = side < 0 ? q : r;
+        double deepest = MIN(MAX(-half / a, 0), 1);
+        beyond[0] = MAX(beyond[0], hypot(out[0] - b->x, out[1] - b->y) - b->radius);
+        beyond[1] = MAX(beyond[1], b->radius - hypot(x + deepest * ex, y + deepest * ey));
     }
-    if (!met) return 0;
-    if (both == 2) return inside ? 0 : b->radius - sqrt(MAX(x * x + y * y - half * half / a, 0));
-    double one = hypot(x, y) - b->radius, other = hypot(r[0] - b->x, r[1] - b->y) - b->radius;
-    return inside ? MAX(one, other) : MAX(-one, -other);
 }
 
-/* How deep a polygon with its centre at (x, y) is in a piece, m. For a straight piece the least overlap over all
-   separating axes, below 0 if it is clear. For an arc how far the polygon is on the other side, or how deep an end of the
-   arc is in it, if that is less; else 0. */
-static double deep_in(const Barrier *b, double (*p)[2], int count, double x, double y) {
-    double clear = -INFINITY, low = INFINITY, high = -INFINITY, far = 0, ends[2] = {INFINITY, INFINITY};
-    int inside = hypot(x - b->x, y - b->y) < b->radius;
+/* How deep a polygon is in a piece, m. For a straight piece the least overlap over all
+   separating axes, below 0 if it is clear. For an arc how far the polygon is outside its circle, or inside it, or how deep
+   an end of the arc is in it, whichever is least; else 0. */
+static double deep_in(const Barrier *b, double (*p)[2], int count) {
+    double clear = -INFINITY, low = INFINITY, high = -INFINITY, beyond[2] = {0, 0}, ends[2] = {INFINITY, INFINITY};
     for (int n = 0; n < count; n++) {
         const double *q = p[n], *r = p[n + 1 < count ? n + 1 : 0];
         double ex = r[0] - q[0], ey = r[1] - q[1], size = hypot(ex, ey), off[2];
@@ -378,14 +375,14 @@ static double deep_in(const Barrier *b, double (*p)[2], int count, double x, dou
             ends[k] = MIN(ends[k], -off[k]);
         }
         clear = MAX(clear, MIN(off[0], off[1]));
-        if (b->radius > 0) far = MAX(far, across(b, q, r, inside));
+        if (b->radius > 0) add_edge(b, q, r, beyond);
         else {
             low = MIN(low, beside(b, q[0], q[1]));
             high = MAX(high, beside(b, q[0], q[1]));
         }
     }
     if (b->radius == 0) return -MAX(clear, MAX(low, -high));
-    double end = b->whole ? 0 : MAX(ends[0], ends[1]);
+    double far = MIN(beyond[0], beyond[1]), end = b->whole ? 0 : MAX(ends[0], ends[1]);
     return end > 0 ? far > 0 ? MIN(far, end) : end : far;
 }
 
@@ -577,7 +574,7 @@ PAIRED static void check_beside_moving(const Interval *now, Barrier *b, int numb
         if (is_cornered()) {
             int count = corners_at(now->knot, share, place[0], place[1], b, corners);
             depth = -INFINITY;
-            for (int n = 0; n < MAX(b->chain, 1); n++) depth = MAX(depth, deep_in(b + n, corners, count, x, y));
+            for (int n = 0; n < MAX(b->chain, 1); n++) depth = MAX(depth, deep_in(b + n, corners, count));
             gap -= At.reach - At.margin;
         }
         int there = is_there(b, t) && t >= b->appears + L.dt;

@@ -260,20 +260,24 @@ static int side_of(const Shape *a, const Surface *s, int corner, double near) {
     return cut >= low && cut <= s->length + high ? centre : own;
 }
 
-/* Whether a point of a shape is inside the circle of an arc: its own position decides, or that of the centre if the line
-   between both, which is inside the shape, crosses the arc. */
+/* Whether a point of a shape is on the inside of an arc: its own position decides, unless the line from it to the centre,
+   which is inside the shape, crosses the arc once. Outside the circle are both where a shape lies over the opening: then
+   the line may enter the circle through the arc, and leave it through the opening. */
 static int is_inside(const Shape *a, const Surface *s, double px, double py) {
     double x = px - s->x, y = py - s->y, u = a->x - s->x, v = a->y - s->y;
     double off = x * x + y * y - square(s->radius);
-    int own = off <= 0, centre = u * u + v * v < square(s->radius);
-    if (own == centre) return own;
+    int own = off <= 0, centre = u * u + v * v < square(s->radius), result = own;
+    if (own && centre) return own;
     u -= x;
     v -= y;
-    double whole = u * u + v * v, half = x * u + y * v, root = sqrt(half * half - whole * off);
-    double cut = ((own ? root : -root) - half) / whole;
-    x += cut * u;
-    y += cut * v;
-    return s->shape == CIRCLE || x * s->tx + y * s->ty >= s->cos_half * s->radius ? centre : own;
+    double whole = u * u + v * v, half = x * u + y * v, root = half * half - whole * off;
+    if (own == centre && !(half < 0 && whole > -half && root > 0)) return own;
+    root = sqrt(root);
+    for (int side = own ? 1 : -1; side <= (centre ? -1 : 1); side += 2) {
+        double cut = (side * root - half) / whole;
+        if (s->shape == CIRCLE || (x + cut * u) * s->tx + (y + cut * v) * s->ty >= s->cos_half * s->radius) result = !result;
+    }
+    return result;
 }
 
 /* How far beyond an end of a segment a corner may be and still be on the segment: only rounding, unless the segment

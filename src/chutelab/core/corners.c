@@ -551,6 +551,17 @@ static double root_of(int i, int j, Touch *at, double low, double high, double a
     return high;
 }
 
+/* The instant within (low, high] at which two polygons begin to overlap. */
+static double overlap_at(int i, int j, double low, double high) {
+    for (;;) {
+        double middle = 0.5 * (low + high);
+        if (!(middle > low && middle < high)) return high;
+        Shape a = shape_of(i, middle), b = shape_of(j, middle);
+        if (are_apart(&a, &b, 0)) low = middle;
+        else high = middle;
+    }
+}
+
 /* Whether a place at which two touch at t closes faster than `soft`. */
 static int closes_faster(int i, int j, Shape *a, Shape *b, double t, double within, double soft) {
     Touch places[MOST_TOUCHES];
@@ -577,7 +588,7 @@ static double rolls_at(int i, int j, double low, double high, double soft) {
 double meet_corners(int i, int j, double from, double until, double most, double soft) {
     double span = until - from, small = inner_of(i, j), near = TOUCH * small;
     double h = 0, first = INFINITY, gap[CANDIDATES];
-    int sides[MOST_CORNERS], in_reach[CANDIDATES], many = 0, closed;
+    int sides[MOST_CORNERS], in_reach[CANDIDATES], many = 0, closed, clear;
     if (!(span > 0) || most <= soft) return INFINITY;
     Shape a = shape_of(i, from), b = shape_of(j, from);
     int count = a.count + b.count, on_segment = b.s && b.s->shape == SEGMENT, both = !b.s && b.round < 0;
@@ -585,6 +596,7 @@ double meet_corners(int i, int j, double from, double until, double most, double
     double bends = turn * (2 * most + 4 * turn * MAX(W.disks[i].radius, both ? W.disks[j].radius : 0));
     if (are_apart(&a, &b, most * span + near)) return INFINITY;
     closed = both && overlap(&a, &b);
+    clear = both && !closed;
     /* On something round all corners are one candidate: when one leaves, the next may arrive. */
     int rolls = b.round >= 0 && span * (fabs(W.disks[i].spin) + (j < 0 ? 0 : fabs(W.disks[j].spin))) > ROLLS;
     for (int c = 0; c < count; c++) {
@@ -625,6 +637,13 @@ double meet_corners(int i, int j, double from, double until, double most, double
             Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
             if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
         }
+        /* A tip that passes through a tip within a stride is inside nothing after it, but edges cross then. */
+        if (!clear || first < INFINITY || most * (t - last) < near) continue;
+        clear = are_apart(&a2, &b2, 0);
+        if (clear) continue;
+        double then = overlap_at(i, j, last, t);
+        Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
+        if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
     }
     return first;
 }

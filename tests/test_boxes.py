@@ -508,7 +508,7 @@ def test_a_tip_that_passes_a_tip_strikes_it():
 def test_poured_boxes_get_into_each_other_and_into_walls_as_little_as_disks_do(count, until):
     """Half a percent of the radius inside, 99 of 100; one and a half at most.
 
-    By separating axes, of all that are near: of each other the laws know the circle inside.
+    By separating axes, of all that are near.
     """
     recording, half, wide = poured(count, until)
     box, deep = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]), []

@@ -31,7 +31,7 @@ from chutelab.results.record import hermite
 from chutelab.results.recorder import Recorder, StalledError
 from chutelab.scene import SceneError
 from chutelab.studies.sweep import sweep
-from shared import call
+from shared import call, seeds
 from stress.case import TRANSFER, merged, surface, thrown
 
 FLOOR = surface("floor", (-1.0, 0.0), (2.0, 0.0), restitution=0.5, friction=0.3)
@@ -540,6 +540,88 @@ def test_a_particle_inside_another_one_breaks_a_law(engine, deep, passing):
         assert (one.particles, one.particle) == (2, 0)
         assert one.amount == pytest.approx(deep, abs=2e-3)
     assert not run.laws
+
+
+def depth_of(shapes, places, angles):
+    """By how much two shapes are in each other, m: the least way that parts them, of 1,800 ways.
+
+    Along a way w a shape reaches from -s(-w) to s(w), the largest w · corner, or its radius.
+    """
+    ways = np.linspace(0.0, 2.0 * np.pi, 1801)
+    ways = np.stack([np.cos(ways), np.sin(ways)])
+    reach = []
+    for shape, place, angle, side in zip(shapes, places, angles, (1.0, -1.0), strict=True):
+        c, s = np.cos(angle), np.sin(angle)
+        corners = np.atleast_2d(shape.get("points", (0.0, 0.0))) @ np.array([[c, s], [-s, c]])
+        most = ((place + corners) @ (side * ways)).max(axis=0) + shape.get("radius", 0.0)
+        reach.append(most)
+    return (reach[0] + reach[1]).min()
+
+
+def inside(shape):
+    """The radius of a shape, or of the circle inside it about its centroid, m."""
+    if "radius" in shape:
+        return shape["radius"]
+    corners = np.array(shape["points"])
+    (x, y), (u, v) = corners.T, np.roll(corners, -1, axis=0).T
+    return ((x * v - y * u) / np.hypot(u - x, v - y)).min()
+
+
+def stone(random):
+    """Return a disk, or a polygon that may be thin, its centroid at the origin."""
+    count = int(random.integers(2, 9))
+    if count == 2:
+        return {"radius": float(random.uniform(0.01, 0.03))}
+    turns = (np.arange(count) + random.uniform(-0.3, 0.3, count)) * 2.0 * np.pi / count
+    points = 0.03 * np.stack([np.cos(turns), np.sin(turns) * random.uniform(0.1, 1.0)], axis=1)
+    x, y = points.T
+    u, v = np.roll(points, -1, axis=0).T
+    area = x * v - y * u
+    centre = np.array([((x + u) * area).sum(), ((y + v) * area).sum()]) / (3.0 * area.sum())
+    return {"shape": "polygon", "points": (points - centre).tolist()}
+
+
+@pytest.mark.parametrize("seed", seeds(6, 60))
+def test_how_deep_particles_are_in_each_other_is_known_at_all_times(seed):
+    """Disks and polygons that turn and fly through each other, however short they overlap.
+
+    Judged as if they met. An overlap may be found a hundredth of the radius late.
+    """
+    random = np.random.default_rng(seed)
+    shapes = [stone(random), stone(random)]
+    least = min(map(inside, shapes))
+    # At t = 0.05 their centres are beside each other, near where they touch.
+    aside = random.uniform(0.8, 1.8) * sum(map(inside, shapes))
+    way = random.uniform(0.0, 2.0 * np.pi)
+    along, across = (np.array([np.cos(a), np.sin(a)]) for a in (way, way + 0.5 * np.pi))
+    velocity = random.uniform(0.5, 10.0) * along
+    streams = [
+        {"at": at.tolist(), "velocity": v.tolist(), "particle": name, "interact": True,
+         "omega": float(random.uniform(-20.0, 20.0))}
+        for name, at, v in (("a", aside * across - 0.05 * velocity, velocity),
+                            ("b", np.zeros(2), np.zeros(2)))
+    ]  # fmt: skip
+    run = chutelab.simulate({
+        "gravity": 0.0,
+        "particle": [{"name": n, "mass": 0.1, "spin": True, **one}
+                     for n, one in zip("ab", shapes, strict=True)],
+        "surface": [surface("far", (-5.0, -5.0), (5.0, -5.0))],
+        "pair": [{"between": ["a", "b"], "meet": False}],
+        "stream": streams, "run": {"until": 0.1},
+    }, engine="contact")  # fmt: skip
+    assert not run.laws
+    span = min(0.0499, 0.07 / np.hypot(*velocity))
+    times = np.linspace(0.05 - span, 0.05 + span, 500)
+    now = run.at(times)
+    deep = [depth_of(shapes, *both) for both in zip(now.position, now.angle, strict=True)]
+    deepest = max(deep) / least
+    machine = replace(run.machine, pair_restitution=np.abs(run.machine.pair_restitution))
+    found = [one for one in replace(run, machine=machine).laws if one.law == laws.APART]
+    assert bool(found) == (deepest > 0.05) or abs(deepest - 0.05) < 0.01
+    for one in found:
+        assert one.amount == pytest.approx(deepest, rel=0.01, abs=0.02)
+        first = times[np.argmax(np.array(deep) > 0.05 * least)]
+        assert one.t == pytest.approx(first, abs=0.03 * least / np.hypot(*velocity) + 1e-4)
 
 
 def test_what_a_rod_joins_may_be_in_one_place():

@@ -327,15 +327,19 @@ PAIRED static int is_clear(const Curve *c, const Barrier *b, double limit) {
 
 /* Particles with corners. */
 
+/* Angle of a particle at a share of the interval after a knot, rad. Between knots the spin changes at a constant rate; the
+   remaining difference of the angle is spread evenly. */
+double angle_at(int knot, double share) {
+    const double *now = KNOT(knot), *next = now + L.row;
+    double h = next[0] - now[0], missed = L.angles[knot + 1] - L.angles[knot] - 0.5 * h * (now[5] + next[5]);
+    return L.angles[knot] + share * (h * (now[5] + 0.5 * share * (next[5] - now[5])) + missed);
+}
+
 /* Set the corners of a particle at a share of the interval after a knot, with its centre at (x, y), in the frame of a
-   piece. Return how many. Between knots the spin changes at a constant rate; the remaining difference of the angle is
-   spread evenly. */
+   piece. Return how many. */
 static int corners_at(int knot, double share, double x, double y, const Barrier *b, double (*p)[2]) {
     const Body *body = L.bodies + At.particle;
-    const double *now = KNOT(knot), *next = now + L.row;
-    double h = next[0] - now[0], t = now[0] + share * h, gone = L.angles[knot + 1] - L.angles[knot];
-    double missed = gone - 0.5 * h * (now[5] + next[5]);
-    double angle = L.angles[knot] + share * (h * (now[5] + 0.5 * share * (next[5] - now[5])) + missed);
+    double t = KNOT(knot)[0] + share * (KNOT(knot + 1)[0] - KNOT(knot)[0]), angle = angle_at(knot, share);
     double c = cos(angle), s = sin(angle);
     for (int n = 0; n < body->corners; n++) {
         const double *q = L.outlines + 2 * (body->outline + n);

@@ -41,9 +41,6 @@ Laws L;
 /* Share of the radius by which the pymunk engine enlarges its disks, and so their levers. */
 #define HAIR 1e-10
 
-
-static double square(double a) { return a * a; }
-
 static int last_of(int i) { return L.offsets[i + 1] - 1; }
 
 static int is_released(int i) { return L.offsets[i + 1] > L.offsets[i]; }
@@ -606,8 +603,8 @@ EXPORT int lay_out_laws(void) {
     RESERVE(L.swings, L.swing_count);
     RESERVE(L.breaches, BREACHES);
     RESERVE(L.order, crowd ? MAX(L.knot_count, L.particle_count) : L.interact ? L.particle_count : 1);
-    RESERVE(L.places, L.interact ? 2.0 * L.particle_count : 1);
-    RESERVE(L.cursors, L.interact ? L.particle_count : 1);
+    RESERVE(L.places, crowd ? 2.0 * L.particle_count : 1);
+    RESERVE(L.paths, L.interact ? L.particle_count : 1);
     RESERVE(L.passing, L.kind_count * (double)L.kind_count);
     return has_room();
 }

@@ -10,6 +10,8 @@
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 
+static inline double square(double a) { return a * a; }
+
 /* Two numbers side by side, such as x and y: one instruction works on both. */
 #define PAIRED __attribute__((target("simd128")))
 typedef double Two __attribute__((vector_size(16), aligned(8)));
@@ -46,6 +48,7 @@ double distance(const Barrier *b, double x, double y);
 void to_rest(const Barrier *b, double t, double *x, double *y);
 double swiftest(const Barrier *b, double *haste);
 void place_at(const double *knot, double share, double *x, double *y);
+double angle_at(int knot, double share);
 int find_hits(int particle);
 
 /* overlaps.c */

@@ -784,12 +784,24 @@ typedef struct {                                                                
     double radius;          /* m; with corners that of the inner circle */
     double mass, inertia;   /* kg, kg m2 */
     double gravity;         /* m/s2 */
+    double reach;           /* m; radius, with its corners, see overlaps.c */
     int corners, outline;   /* number of corners, 0 if it is round, and the first one in `Laws.outlines` */
     int kind;
     int group;              /* from 1 on, of particles that nothing holds apart; else 0 */
     int overlaps;           /* whether it is deeper in another one than it may be */
     int pad;
 } Body;
+
+/* The path of a particle in a span of time, and its corners. */
+typedef struct {
+    double box[4];          /* m; left, bottom, right, top, with its corners; empty if it is not there */
+    double from[4], to[4];  /* m, m/s; place and velocity at both ends */
+    double strays;          /* m; from an even motion from the one place to the other, at most; INFINITY if it is there for
+                               a part of the span */
+    double turns;           /* m; way of its corners by rotation, at most */
+    int knot;               /* the one before the span */
+    int pad;
+} Path;
 
 /* A place where a particle is deeper in a piece than is allowed, or passes through it. */
 typedef struct {                                                                         /* [out] */
@@ -823,8 +835,8 @@ typedef struct {
     Breach *breaches;       /* (BREACHES) */
     Hit *hits;              /* in the order of particles and knots */
     int *order;             /* (knots) for crowds of the contact engine, (particles) for all crowds */
-    double *places;         /* (particles, 2) for crowds */
-    int *cursors;           /* (particles) for crowds: the knot before an instant */
+    double *places;         /* (particles, 2) for the same */
+    Path *paths;            /* (particles) for crowds */
     int *passing;           /* [in] (kind_count, kind_count) whether two kinds do not meet */
     /* sizes */
     int particle_count, piece_count, knot_count, row; /* [in] row: doubles from knot to knot */

@@ -39,6 +39,11 @@ class Core:
         return self._array("pairs", "Pair", 1 + self.job.materials)
 
     @property
+    def contacts(self):
+        """Lasting contacts of the latest step."""
+        return self._array("earlier", "Contact", self.world.earlier_count)
+
+    @property
     def world(self):
         return self.module.world
 

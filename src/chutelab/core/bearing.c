@@ -20,11 +20,14 @@ static void impulse_of(const Contact *c, double share, double *J) {
     J[1] = share * (pressed(c) * c->ny - c->impulse[1] * c->nx);
 }
 
+/* The loads by the partner are then reported by `tell_frozen`. */
+static int is_on_sleeper(const Contact *c) { return sleeps(c->j); }
+
 /* Report the load by a contact of disk i with a surface, or with a rider: then the belt of the rider bears it. */
 void bear_contact(const Contact *c, double share, double from, double to) {
     const Disk *a = W.disks + c->i;
     double J[2];
-    if (B.every == 0 || c->two) return;
+    if (B.every == 0 || c->two || is_on_sleeper(c)) return;
     Push p = c->j < 0 ? at_foot(a, c->owner, c->cornered ? c->own[1] : a->radius, c->nx, c->ny, from, to)
                       : on_belt(W.disks + c->j, from, to);
     if (c->cornered && c->j < 0) {
@@ -45,7 +48,7 @@ static void keep_push(const Disk *d, const Push *p, double depth) {
 }
 
 /* The vector to the centre of disk i from that of its partner, or from its foot on a surface, m. */
-static void branch_of(const Contact *c, double *b) {
+void branch_of(const Contact *c, double *b) {
     const Disk *a = W.disks + c->i, *other = W.disks + MAX(c->j, 0);
     b[0] = c->j < 0 ? a->radius * c->nx : a->x - other->x;
     b[1] = c->j < 0 ? a->radius * c->ny : a->y - other->y;
@@ -69,7 +72,7 @@ void keep_impulse(const Contact *c, double share, double from, double to) {
 /* Record that the belt gives a rider what a contact takes from it, also in an impact, as its path doesn't change. */
 void keep_carried(const Contact *c, double share, double from, double to) {
     double J[2];
-    if (B.each == 0 || c->j < 0 || c->two) return;
+    if (B.each == 0 || c->j < 0 || c->two || is_on_sleeper(c)) return;
     impulse_of(c, share, J);
     Push p = on_belt(W.disks + c->j, from, to);
     p.jx = J[0];
@@ -115,132 +118,161 @@ void bear_ride(int i) {
     if (B.each > 0) keep_push(d, &p, d->radius);
 }
 
-/* Note the force with which the last surface of `held` supported a disk in a step. */
-void note_force(Disk *d, const Contact *c, double span) {
-    double *force = d->bears + 2 * (d->held_count - 1);
-    force[0] = (pressed(c) * c->nx + c->impulse[1] * c->ny) / span;
-    force[1] = (pressed(c) * c->ny - c->impulse[1] * c->nx) / span;
-}
-
-/* Report the loads by a sleeper since it fell asleep, and for the time `more` at the end. */
-void bear_asleep(const Disk *d, double until, double more) {
-    if (B.each > 0) keep_awake((int)(d - W.disks), until, until - d->slept + more);
-    for (int n = 0; n < d->held_count && B.every > 0; n++) {
-        double nx, ny, time = until - d->slept + more;
-        const Surface *s = W.surfaces + d->held[n];
-        double depth = depth_of(d, s, &nx, &ny);
-        Push p = at_foot(d, s->owner, depth, nx, ny, d->slept, until);
+/* Report the loads by a frozen contact of two sleepers, or of one with a surface, up to t. */
+void melt(Frozen *f, double t) {
+    double time = t - f->from, J[2] = {time * (f->force[0] + f->more[0]), time * (f->force[1] + f->more[1])};
+    const Disk *d = W.disks + f->i, *first = W.disks + f->first;
+    if (f->from == INFINITY) return;
+    f->from = INFINITY;
+    if (B.each > 0) keep_contact(f->i, f->j < 0 ? -1 - W.surfaces[-1 - f->j].owner : f->j, t - time, t, J, f->branch);
+    if (B.every > 0 && f->j < 0) {
+        const Surface *s = W.surfaces + (-1 - f->j);
+        double nx, ny, way = d->t - (t - time);
+        gap_to(s, d->x, d->y, d->radius, &nx, &ny);
+        Push p = at_foot(d, s->owner, 0, nx, ny, t - time, t);
         p.vx = d->ux;
         p.vy = d->uy;
-        p.x -= d->ux * (d->t - d->slept);
-        p.y -= d->uy * (d->t - d->slept);
-        p.jx = d->bears[2 * n] * time;
-        p.jy = d->bears[2 * n + 1] * time;
+        p.x -= f->branch[0] + d->ux * way;
+        p.y -= f->branch[1] + d->uy * way;
+        p.jx = J[0];
+        p.jy = J[1];
         bear(&p);
     }
+    time = f->first == f->i ? -time : time;
+    if (f->j >= 0) bear_disk(first, first->bearer, time * f->more[0], time * f->more[1], t - fabs(time), t);
 }
 
-/* Correct the forces on islands that have just fallen asleep so that they bear the weight: the difference, an error of
-   the solve, is distributed over all forces in proportion to their size. `W.queue` leads to the roots of islands. */
-void balance_sleepers(void) {
-    for (int i = W.low; i < W.high && B.every > 0; i++) {
-        if (W.disks[i].mode != ASLEEP || W.disks[i].slept != W.t || island_of(i) != i) continue;
-        double x = 0, y = 0, size = 0;
-        for (int pass = 0; pass < 2; pass++)
-            for (int n = W.low; n < W.high; n++) {
-                Disk *d = W.disks + n;
-                if (d->mode != ASLEEP || d->slept != W.t || d->island != i) continue;
-                if (pass == 0) x -= d->mass * W.gx, y -= d->mass * W.gy;
-                for (double *f = d->bears; f < d->bears + 2 * d->held_count; f += 2) {
-                    double strong = sqrt(square(f[0]) + square(f[1]));
-                    if (pass == 0) x -= f[0], y -= f[1], size += strong;
-                    else f[0] += x * strong / size, f[1] += y * strong / size;
-                }
-            }
-    }
+/* Report that a sleeper got the impulse J (on i of the pair) from its awake partner up to a time. The surface below the
+   sleeper bears what differs from the force that was frozen. */
+void tell_frozen(Frozen *f, int sleeper, const double *J, double to) {
+    const Disk *d = W.disks + sleeper;
+    double time = to - f->told, sign = sleeper == f->j ? 1 : -1;
+    bear_disk(d, d->bearer, sign * (J[0] - f->force[0] * time), sign * (J[1] - f->force[1] * time), MIN(f->told, to),
+              MAX(f->told, to));
+    f->told = to;
 }
 
 /* Greatest number of rounds of conjugate gradients, and the share of the weight that they may leave unbalanced. */
-#define ROUNDS 200
+#define ROUNDS 1000
 #define BALANCED 1e-12
+/* Share of a change of force that a smooth surface takes across its normal. */
+#define SMOOTH 1e-4
 
 enum { RESIDUAL, DIRECTION, SOLUTION, PRODUCT };
 
 /* One of the four vectors of conjugate gradients, at a disk. */
-static double *vector_of(int disk, int which) { return B.balance + 8 * disk + 2 * which; }
+static double *of(int disk, int which) { return W.balance + 8 * disk + 2 * which; }
 
-/* Multiply a vector by the Laplacian of the net of contacts, and add the product to another one. */
-static void multiply(const Lasting *rows, int count, int which, int to) {
-    for (const Lasting *c = rows; c < rows + count; c++)
-        for (int n = 0; n < 2; n++) {
-            double more = vector_of(c->disk, which)[n] - (c->other < 0 ? 0 : vector_of(c->other, which)[n]);
-            vector_of(c->disk, to)[n] += more;
-            if (c->other >= 0) vector_of(c->other, to)[n] -= more;
-        }
+/* Whether the forces on a disk are balanced now: it has just fallen asleep, or the rest of its island has. */
+static int is_new(int i) { return sleeps(i) && W.disks[i].balanced == W.t; }
+
+/* The change of force of a frozen contact for the difference of a vector at its two disks: in proportion to the square of
+   the force, and on a smooth surface nearly along its normal. */
+static void give_more(const Frozen *f, int which, double *given) {
+    double force[2], more[2], strong = 0, along = 0;
+    double across = f->j < 0 && surface_pair(W.disks + f->i, -1 - f->j)->friction == 0 ? SMOOTH : 1;
+    for (int n = 0; n < 2; n++) {
+        force[n] = f->force[n] + f->more[n];
+        more[n] = of(f->i, which)[n] - (f->j < 0 ? 0 : of(f->j, which)[n]);
+        strong += square(force[n]);
+        along += force[n] * more[n];
+    }
+    for (int n = 0; n < 2; n++) given[n] = across * strong * more[n] + (1 - across) * along * force[n];
 }
 
-/* Change the forces of contacts as little as possible so that they bear the weight of all sleepers; what they miss is the
-   error of the solve. The change of a force is the difference of a potential at its two disks, and the Laplacian of the
-   potential on the net of contacts is the missing weight. Conjugate gradients find the potential. */
-static void balance_contacts(Lasting *rows, int count) {
-    double size = 0, weight = 0;
+/* Multiply a vector by the Laplacian of the net of contacts, and add the product to another one. */
+static void multiply(int which, int to) {
+    double given[2];
+    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
+        if (f->from != W.t) continue;
+        give_more(f, which, given);
+        for (int n = 0; n < 2; n++) {
+            of(f->i, to)[n] += given[n];
+            if (f->j >= 0) of(f->j, to)[n] -= given[n];
+        }
+    }
+}
+
+/* Set a vector to 0 at disks that are not balanced now; return the sum of its squares. */
+static double square_of(int which) {
+    double sum = 0;
+    for (int i = W.low; i < W.high; i++)
+        for (int n = 0; n < 2; n++) sum += square(of(i, which)[n] *= is_new(i));
+    return sum;
+}
+
+/* If all of an island sleeps now, after parts of it did, the forces on all of it are balanced once more. */
+static void begin_whole(void) {
+    int *parent = W.queue, *open = W.found;
+    for (EACH_LIVE(i)) {
+        parent[i] = i;
+        open[i] = 0;
+    }
+    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++)
+        if (f->j >= 0 && f->from < INFINITY) parent[island_of(f->i)] = island_of(f->j);
+    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++)
+        if (f->from == INFINITY) open[island_of(W.disks[f->i].mode == ASLEEP ? f->i : f->j)] = 1;
+    for (EACH_LIVE(i))
+        if (is_new(i)) open[island_of(i)] |= 2;
+    for (Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
+        if (f->from == INFINITY || open[island_of(f->i)] != 2) continue;
+        melt(f, W.t);
+        f->from = W.t;
+        for (int n = 0; n < 2; n++) f->force[n] += f->more[n], f->more[n] = 0;
+    }
+    for (EACH_LIVE(i))
+        if (W.disks[i].mode == ASLEEP && open[island_of(i)] == 2) W.disks[i].balanced = W.t;
+}
+
+/* Change the forces of contacts that have just been frozen as little as possible so that they bear the weight of those that
+   fell asleep; what they miss is the error of the solve. The change of a force is the difference of a potential at its two
+   disks, and the Laplacian of the potential on the net of contacts is the missing weight. Conjugate gradients find the
+   potential. */
+void balance_sleepers(void) {
+    begin_whole();
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
-        int sleeps = d->mode == ASLEEP && d->slept == W.t;
-        for (int n = 0; n < 8; n++) vector_of(i, 0)[n] = 0;
-        vector_of(i, RESIDUAL)[0] = sleeps ? -d->mass * W.gx : 0;
-        vector_of(i, RESIDUAL)[1] = sleeps ? -d->mass * W.gy : 0;
-        for (int n = 0; n < 2; n++) weight += square(vector_of(i, RESIDUAL)[n]);
+        for (int n = 0; n < 8; n++) of(i, 0)[n] = 0;
+        of(i, RESIDUAL)[0] = -d->mass * W.gx;
+        of(i, RESIDUAL)[1] = -d->mass * W.gy;
     }
-    for (const Lasting *c = rows; c < rows + count; c++)
-        for (int n = 0; n < 2; n++) {
-            vector_of(c->disk, RESIDUAL)[n] -= (&c->x)[n];
-            if (c->other >= 0) vector_of(c->other, RESIDUAL)[n] += (&c->x)[n];
+    double weight = square_of(RESIDUAL);
+    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++)
+        for (int n = 0; n < 2 && (f->from == W.t || f->from == INFINITY); n++) {
+            double force = f->force[n] + (f->from == W.t ? f->more[n] : 0);
+            of(f->i, RESIDUAL)[n] -= force;
+            if (f->j >= 0) of(f->j, RESIDUAL)[n] += force;
         }
+    double size = square_of(RESIDUAL);
     for (int i = W.low; i < W.high; i++)
-        for (int n = 0; n < 2; n++) {
-            vector_of(i, DIRECTION)[n] = vector_of(i, RESIDUAL)[n];
-            size += square(vector_of(i, RESIDUAL)[n]);
-        }
+        for (int n = 0; n < 2; n++) of(i, DIRECTION)[n] = of(i, RESIDUAL)[n];
     for (int round = 0; round < ROUNDS && size > square(BALANCED) * weight; round++) {
-        double along = 0, now = 0;
-        for (int i = W.low; i < W.high; i++) vector_of(i, PRODUCT)[0] = vector_of(i, PRODUCT)[1] = 0;
-        multiply(rows, count, DIRECTION, PRODUCT);
+        double along = 0, now;
+        for (int i = W.low; i < W.high; i++) of(i, PRODUCT)[0] = of(i, PRODUCT)[1] = 0;
+        multiply(DIRECTION, PRODUCT);
+        square_of(PRODUCT);
         for (int i = W.low; i < W.high; i++)
-            for (int n = 0; n < 2; n++) along += vector_of(i, DIRECTION)[n] * vector_of(i, PRODUCT)[n];
+            for (int n = 0; n < 2; n++) along += of(i, DIRECTION)[n] * of(i, PRODUCT)[n];
         if (!(along > 0)) break;
         for (int i = W.low; i < W.high; i++)
             for (int n = 0; n < 2; n++) {
-                vector_of(i, SOLUTION)[n] += size / along * vector_of(i, DIRECTION)[n];
-                vector_of(i, RESIDUAL)[n] -= size / along * vector_of(i, PRODUCT)[n];
-                now += square(vector_of(i, RESIDUAL)[n]);
+                of(i, SOLUTION)[n] += size / along * of(i, DIRECTION)[n];
+                of(i, RESIDUAL)[n] -= size / along * of(i, PRODUCT)[n];
             }
+        now = square_of(RESIDUAL);
         for (int i = W.low; i < W.high; i++)
-            for (int n = 0; n < 2; n++)
-                vector_of(i, DIRECTION)[n] = vector_of(i, RESIDUAL)[n] + now / size * vector_of(i, DIRECTION)[n];
+            for (int n = 0; n < 2; n++) of(i, DIRECTION)[n] = of(i, RESIDUAL)[n] + now / size * of(i, DIRECTION)[n];
         size = now;
     }
-    for (Lasting *c = rows; c < rows + count; c++) {
-        double *force = &c->x, strong = square(force[0]) + square(force[1]), b[2];
-        for (int n = 0; n < 2; n++) b[n] = (force[0] * c->stress[n] + force[1] * c->stress[2 + n]) / strong;
+    for (Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
+        double given[2];
+        if (f->from != W.t) continue;
+        give_more(f, SOLUTION, given);
         for (int n = 0; n < 2; n++) {
-            force[n] += vector_of(c->disk, SOLUTION)[n] - (c->other < 0 ? 0 : vector_of(c->other, SOLUTION)[n]);
-            for (int k = 0; k < 2; k++) c->stress[2 * n + k] = force[n] * b[k];
+            f->more[n] += given[n];
+            if (f->j >= 0 && !(is_new(f->i) && is_new(f->j))) continue;
+            f->force[n] += f->more[n];
+            f->more[n] = 0;
         }
     }
-}
-
-/* Keep the forces that hold what has just fallen asleep: those of its latest step, balanced. */
-void keep_sleepers(void) {
-    int first = B.asleep_count;
-    for (int n = 0; n < W.contact_count && B.each > 0; n++) {
-        const Contact *c = W.contacts + n;
-        const Disk *d = W.disks + c->i;
-        double force[2], b[2];
-        if (d->mode != ASLEEP || d->slept != W.t || (c->impulse[0] == 0 && c->clings == 0)) continue;
-        impulse_of(c, 2 / (W.length_before + W.length), force);
-        branch_of(c, b);
-        keep_asleep(c->i, other_of(c), d->slept, force, b);
-    }
-    if (B.asleep_count > first) balance_contacts(B.asleep + first, B.asleep_count - first);
 }

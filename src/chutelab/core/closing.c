@@ -172,12 +172,15 @@ static void tell_separation(int i) {
 /* Restart the rest of a disk if something moves at its contacts, or it has none, and if it is also further from where its
    rest began than the greatest speed that counts as rest would take it. */
 static void settle_down(Disk *d, double h) {
-    double most = REST * sqrt(W.g * d->radius) * CALM_DOWN / W.pace;
+    double most = REST * sqrt(W.g * d->radius) * d->waits;
     double x = d->x - d->anchor[0], y = d->y - d->anchor[1], turn = d->anchor[2];
     int stays = x * x + y * y <= most * most && fabs(turn) <= most, moves = d->stirred || !d->supports;
     d->stirred = 0;
     if (d->rest > h && (!moves || stays)) return;
-    if (d->rest > h) d->rest = 0;
+    if (d->rest > h) {
+        d->rest = 0;
+        d->waits = CALM_DOWN / W.pace;
+    }
     d->anchor[0] = d->x;
     d->anchor[1] = d->y;
     d->anchor[2] = 0;
@@ -212,7 +215,7 @@ static void book_lasting(const Contact *c, double past, double h) {
     keep_impulse(c, 1, W.t - past, W.t + 0.5 * h);
     book(a->gain, b ? b->gain : 0, c->owner, c->entries);
     if (c->j < 0) W.drives[c->owner] += driven(c, 0);
-    if (given[0] != 0) book(a->gain, 0, W.ride_owner, given);
+    if (given[0] != 0) book(a->gain, 0, giver_of(c), given);
     a->ahead[0] += c->given[1];
     for (int k = 0; k < 3; k++) {
         a->ahead[k] += (c->two ? 0.5 : 1) * c->later[k];
@@ -231,7 +234,8 @@ void close_step(double h) {
         /* A disk by itself that leaves a surface may come back to it within this step, by the error of a step. That is no
            impact, although infinite friction would make it one, however soft. */
         if (d->mode == FREE && (W.interact || !d->supports)) d->held_count = 0;
-        d->supports = 0;
+        /* A sleeper stays supported. */
+        d->supports = d->mode == ASLEEP;
         if (W.length_before > 0.01 * W.step) d->impacts = 0;
         for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
         d->lacks = d->open = 0;
@@ -269,10 +273,7 @@ void close_step(double h) {
         if (c->impulse[0] == 0 && c->clings == 0) continue;
         if (!W.interact && !a->supports) a->held_count = 0;
         double past = past_of(c);
-        if (!b && a->held_count < MAX_HELD) {
-            a->held[a->held_count++] = -1 - c->j;
-            note_force(a, c, past + 0.5 * h);
-        }
+        if (!b && a->held_count < MAX_HELD) a->held[a->held_count++] = -1 - c->j;
         relative(c, 1, u);
         relative(c, 0, v);
         if (!c->halved) book_lasting(c, past, h);
@@ -296,12 +297,13 @@ void close_step(double h) {
         }
         if (off > rest || slip > rest || turn > rest || (b && b->mode == RIDING)) {
             a->stirred = 1;
-            if (b) b->stirred = 1;
+            if (b && b->mode == FREE) b->stirred = 1;
             /* A driven disk is not at rest, even if it stays where it is. */
             if (b ? b->mode == RIDING : c->other[1] != 0 || stirs(s)) a->rest = 0;
         }
     }
     give_back(W.contacts, W.contact_count);
+    note_frozen();
     for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         Track *track = W.tracks + i;
@@ -381,6 +383,21 @@ void close_step(double h) {
         if (W.disks[i].mode == FREE && W.disks[i].ends >= 0) end_in_contact(i, W.disks[i].ends);
 }
 
+/* Take the loads by disk i in the second half of this step back. Of a contact with a disk that is `up`, awake, they
+   stay. */
+void unload(int i, const int *up) {
+    for (int link = W.disks[i].links; link >= 0; link = W.links[link]) {
+        const Contact *c = W.contacts + link / 2;
+        int other = c->i == i ? c->j : c->i;
+        if (c->halved) continue;
+        double share = (c->two ? 0.5 * !(up && up[other]) : c->i == i) * (W.before - 1);
+        keep_impulse(c, share, W.t, W.t + 0.5 * W.length);
+        if (c->i != i) continue;
+        bear_contact(c, W.before - 1, W.t, W.t + 0.5 * W.length);
+        if (c->j >= 0 && !c->two) untell_frozen(c, W.before - 1);
+    }
+}
+
 /* Take back what the second half of this step's impulses did to the ledger for disk i. */
 void take_back(int i) {
     Disk *d = W.disks + i;
@@ -399,12 +416,12 @@ void take_back(int i) {
             else W.books[3 * c->owner + n] -= back;
         }
         if (c->j < 0) W.drives[c->owner] -= driven(c, W.before);
-        keep_impulse(c, (c->two ? 0.5 : c->i == i) * (W.before - 1), W.t, W.t + 0.5 * W.length);
         if (c->i != i) continue;
-        W.books[3 * W.ride_owner] -= c->given[1];
+        if (c->given[1] == 0) continue;
+        W.books[3 * giver_of(c)] -= c->given[1];
         d->entries[0] -= c->given[1];
-        bear_contact(c, W.before - 1, W.t, W.t + 0.5 * W.length);
     }
+    unload(i, 0);
 }
 
 /* End the track of a disk in lasting contact, in the state halfway through this step's impulses. */

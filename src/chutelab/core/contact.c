@@ -74,8 +74,9 @@ void describe(Contact *c, int i, int j) {
         c->gap = d - r - rb;
         pair = pair_of(a->kind, b->kind);
         c->two = b->mode == FREE;
-        c->other[0] = b->vx * c->nx + b->vy * c->ny;
-        c->other[1] = b->vx * c->ny - b->vy * c->nx;
+        const double *v = motion_of(b);
+        c->other[0] = v[0] * c->nx + v[1] * c->ny;
+        c->other[1] = v[0] * c->ny - v[1] * c->nx;
         c->other[2] = 0;
         if (c->two) {
             mass += b->inv_mass;
@@ -90,7 +91,7 @@ void describe(Contact *c, int i, int j) {
     c->rest = pair->restitution, c->falls = pair->falls;
     c->share = 1;
     c->clings = 0;
-    c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx - escapes[0] : 0;
+    c->pull = j < 0 || sleeps(j) ? W.gx * c->ny - W.gy * c->nx - escapes[0] : 0;
     c->gives = c->turns = 0;
     c->most = INFINITY;
     c->parts = 0;
@@ -139,9 +140,14 @@ void push(const Contact *c, const double *J) {
     if (c->hung) push_hinge(c, J);
 }
 
+/* The owner whose surface carries the partner of a contact, a rider or a sleeper. */
+int giver_of(const Contact *c) {
+    return W.disks[c->j].mode == ASLEEP ? W.disks[c->j].bearer : W.ride_owner;
+}
+
 /* Ledger entries, J, of a contact's impulses, which changed its relative velocities from u to v: an impulse J does the
    work J (u + v) / 2. After the share f of the impulse has been given, the rest of it does (1 - f) J (u (1 - f) + v (1 +
-   f)) / 2. `given` is the work of the belt that carries the partner, if that is a rider. */
+   f)) / 2. `given` is the work of the surface that carries the partner, if that is a rider or a sleeper. */
 void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given) {
     const double J[3] = {pressed(c), c->impulse[1], c->impulse[2]};

@@ -20,6 +20,9 @@ extern World W;
 /* The array that was too small, so that `run` makes more room. */
 enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS, FULL_SWINGS };
 
+/* What a run does next. */
+enum Phase { PART, STEP, WITHIN };
+
 /* Contacts are searched up to a gap of this share of the radius. Lasting contacts have gaps up to a fifth of it at most,
    and nothing crosses the rest within a step without being foreseen. */
 #define TOUCH 5e-3
@@ -56,11 +59,11 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 #define TOUCHES 8
 /* Greatest number of sweeps of a jam: what they leave open rattles on, and causes the next jam after a few impacts. */
 #define JAM_SWEEPS 2000
-/* Share of sqrt(g r); at a lower speed an island may fall asleep. 0.5 mm/s for r = 4 mm. */
+/* Share of sqrt(g r); at a lower speed particles may fall asleep. 0.5 mm/s for r = 4 mm. */
 #define REST 2.5e-3
 /* m/s2; gravity for which bounds on speeds and times are written; for another one they are scaled by `W.pace`. */
 #define EARTH 9.81
-/* s on Earth; an island has to be at rest for so long before it sleeps. */
+/* s on Earth; a particle has to be at rest for so long before it sleeps. */
 #define CALM_DOWN 0.05
 /* Share of the speed; a slower approach is a grazing one, and may be rounding. */
 #define GRAZE 1e-6
@@ -189,6 +192,11 @@ static inline int is_tied(int i) { return i >= 0 && W.disks[i].tie >= 0; }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 /* Head of a loop over all disks that are live as a step begins or were released in it. */
 #define EACH_LIVE(i) int at_##i = 0, i; at_##i < W.live_count && (i = W.live[at_##i], 1); at_##i++
+/* Velocity of the partner of a contact; of a sleeper that without the hop. */
+static inline const double *motion_of(const Disk *d) { return d->mode == ASLEEP ? &d->ux : &d->vx; }
+/* Whether so many contacts, together with those of sleepers, are too few for a crowd. */
+static inline int are_few(int contacts) { return contacts + W.frozen_count <= FEW_CONTACTS; }
+static inline int sleeps(int i) { return i >= 0 && W.disks[i].mode == ASLEEP; }
 /* Kinetic and potential energy of a disk for a velocity, a spin and a position, J. */
 static inline double kinetic_of(const Disk *d, const double *v, double spin) {
     return 0.5 * (d->mass * (square(v[0]) + square(v[1])) + d->inertia * square(spin));
@@ -348,6 +356,7 @@ void knot_after(int i);
 void knot_before(int i, double t, double vx, double vy, double spin);
 void flush_track(int i);
 void track_lasting(int i);
+void last_on(int i);
 void track_flying(int i);
 void track_ended(int i);
 void knot_held(int i);
@@ -367,18 +376,19 @@ void begin_in_air(int i, double middle);
 void bear_contact(const Contact *c, double share, double from, double to);
 void bear_disk(const Disk *d, int owner, double jx, double jy, double from, double to);
 void bear_ride(int i);
-void note_force(Disk *d, const Contact *c, double span);
-void bear_asleep(const Disk *d, double until, double more);
 void balance_sleepers(void);
 void keep_impulse(const Contact *c, double share, double from, double to);
 void keep_carried(const Contact *c, double share, double from, double to);
-void keep_sleepers(void);
+void melt(Frozen *f, double t);
+void tell_frozen(Frozen *f, int sleeper, const double *J, double to);
+void branch_of(const Contact *c, double *b);
 
 /* contact.c */
 void describe(Contact *c, int i, int j);
 void relative(const Contact *c, int earlier, double *out);
 void push(const Contact *c, const double *impulse);
 int island_of(int i);
+int giver_of(const Contact *c);
 void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given);
 void pool(Contact *list, int count, int later);
@@ -430,12 +440,18 @@ void solve_contacts(int again);
 /* closing.c */
 void give_in(const Contact *list, int count);
 void close_step(double h);
+void unload(int i, const int *up);
 void take_back(int i);
 void end_in_contact(int i, int reason);
 
 /* sleep.c */
 void wake(int i, double t);
 void fall_asleep(void);
+int find_frozen(const Contact *c);
+void start_from_frozen(Contact *c, double span);
+void note_frozen(void);
+void untell_frozen(const Contact *c, double share);
+void rouse(void);
 
 /* prepare.c */
 int stretch_swings(void);

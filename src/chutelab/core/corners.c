@@ -717,9 +717,11 @@ RARELY void describe_touch(Contact *c, int i, int j, const Touch *t) {
     c->mass[2] = turn > 0 ? 1 / turn : 0;
     c->pull = -square(a->spin) * c->own[0];
     if (j >= 0) {
+        const double *v = motion_of(b);
         c->pull -= square(b->spin) * c->others[0];
-        c->other[0] = b->vx * c->nx + b->vy * c->ny;
-        c->other[1] = b->vx * c->ny - b->vy * c->nx;
+        if (sleeps(j)) c->pull += W.gx * c->ny - W.gy * c->nx;
+        c->other[0] = v[0] * c->nx + v[1] * c->ny;
+        c->other[1] = v[0] * c->ny - v[1] * c->nx;
         c->arm = b->corners ? 0 : pair->rolling * b->radius;
         return;
     }
@@ -778,12 +780,13 @@ RARELY int list_still(int i, int j, double h, const Contact **list) {
     const Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
     const Surface *s = W.surfaces + (j < 0 ? -1 - j : 0);
     int count = 0;
-    if (W.earlier_count <= FEW_CONTACTS || (j < 0 ? s->mover >= 0 || s->shape != SEGMENT : b->mode != FREE)) return 0;
+    int moves = j < 0 ? s->mover >= 0 || s->shape != SEGMENT : b->mode != FREE && !sleeps(j);
+    if (moves || are_few(W.earlier_count)) return 0;
     double turns = fabs(a->spin) * a->radius + (j < 0 ? 0 : fabs(b->spin) * b->radius);
     if (turns * h > STILL * inner_of(i, j)) return 0;
     for (int k = a->before; k >= 0 && count < MOST_TOUCHES; k = W.earlier[k].next)
         if (W.earlier[k].j == j) list[count++] = W.earlier + k;
-    if (!count || list[0]->places != count) return 0;
+    if (!count || list[0]->places != count || list[0]->two != (j >= 0 && b->mode == FREE)) return 0;
     for (int n = 0; n < count; n++)
         if (isnan(gap_change_since(list[n]))) return 0;
     return count;
@@ -799,12 +802,12 @@ RARELY void go_on_with(Contact *c, const Contact *last, double h) {
     c->gives = c->parts = c->clings = 0;
     c->leaves = 0;
     if (c->j >= 0) {
-        const Disk *b = W.disks + c->j;
-        c->other[0] = b->vx * c->nx + b->vy * c->ny;
-        c->other[1] = b->vx * c->ny - b->vy * c->nx;
+        const double *v = motion_of(W.disks + c->j);
+        c->other[0] = v[0] * c->nx + v[1] * c->ny;
+        c->other[1] = v[0] * c->ny - v[1] * c->nx;
     }
     relative(c, 0, u);
-    c->free_gap = c->gap + (u[0] + (c->j < 0 ? 0.5 * h * (W.gx * c->nx + W.gy * c->ny) : 0)) * h;
+    c->free_gap = c->gap + (u[0] + (c->j < 0 || sleeps(c->j) ? 0.5 * h * (W.gx * c->nx + W.gy * c->ny) : 0)) * h;
 }
 
 /* ------------------------------------------------------------------------------------------ impacts */
@@ -841,7 +844,7 @@ static void end_hops(int i, double t) {
     int count = 0, many = 0, stamp = W.step_count + 1;
     double past = W.tracks[i].lasted > 1 ? W.length_before : 0;
     for (int link = W.disks[i].links; link >= 0 && !first; link = W.links[link]) first = W.contacts + link / 2;
-    if (!first || t <= W.t || W.contact_count > FEW_CONTACTS || W.disks[i].smooth == stamp) return;
+    if (!first || t <= W.t || !are_few(W.contact_count) || W.disks[i].smooth == stamp) return;
     W.disks[i].smooth = stamp;
     int island = first->island;
     while (first > W.contacts && first[-1].island == island) first--;
@@ -1156,5 +1159,5 @@ RARELY void strike_corners(int i, int j, double t) {
         a->slips = 1;
     }
     /* A place that comes to rest is a contact from the next step on, which begins soon; in a crowd it may hop until then. */
-    if (rests && W.contact_count <= FEW_CONTACTS) W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
+    if (rests && are_few(W.contact_count)) W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
 }

@@ -936,7 +936,7 @@ EXPORT int lay_out_exact(void) {
 
 /* Run all particles for at most so many rounds; return why it stopped, see `enum Course`. */
 int follow_all(int rounds) {
-    if (B.every > 0.0 && !B.bins && !lay_out_bins(E.surface_count, 0)) return NO_MEMORY;
+    if (B.every > 0.0 && !B.bins && !lay_out_bins(E.surface_count)) return NO_MEMORY;
     for (; E.lone < E.lone_count; E.lone++, E.begun = 0) {
         int member = member_of(E.lone);
         if (E.laid != member + 1) {

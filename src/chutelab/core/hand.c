@@ -6,12 +6,12 @@
 
 #include "core.h"
 
-/* Apply a force (N) to a disk until the next call. A sleeping disk wakes; a disk that the incoming belt carries by
-   adhesion is not moved. */
+/* Apply a force (N) to a disk until the next call. A sleeping disk wakes as the next step begins; a disk that the
+   incoming belt carries by adhesion is not moved. */
 EXPORT void push_disk(int i, double x, double y) {
     Disk *d = W.disks + i;
     W.pushes |= x != 0 || y != 0;
-    if (d->mode == ASLEEP) wake(i, W.t);
+    d->stirred |= d->mode == ASLEEP;
     d->force[0] = x;
     d->force[1] = y;
 }

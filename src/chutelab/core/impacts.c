@@ -114,7 +114,7 @@ static double left_between(const Disk *a, const Disk *b, double radius, double g
 /* The same for two particles of which one has corners. */
 static double left_by_corners(const Disk *a, const Disk *b, int impacts, double t) {
     double small = MIN(a->inner, b->inner), least = MAX(left_over(a, impacts, -1, small, 0), left_over(b, impacts, -1, small, 0));
-    if (W.contact_count <= FEW_CONTACTS) return least;
+    if (are_few(W.contact_count)) return least;
     return MAX(least, left_late(a, b, LATE_CORNERS * small, LATEST * W.soft, t));
 }
 
@@ -698,7 +698,7 @@ static int struck_too(const Contact *c, double t, int *j) {
             relative(o, 0, u);
             lasting = MAX(lasting, -u[0]);
         }
-        if (!moves && W.contact_count > FEW_CONTACTS && lasting <= soft) return 0;
+        if (!moves && !are_few(W.contact_count) && lasting <= soft) return 0;
         for (int n = list_struck(c->i, c->j, t, list) - 1; n >= 0; n--) {
             relative(list + n, 0, u);
             most = MAX(most, -u[0]);

@@ -73,10 +73,12 @@ typedef struct {
     double zone[4];             /* the box with a margin, for which `World.nearby` is right */
     double since;               /* s; time of the latest impact */
     double slept;               /* s; time at which it fell asleep */
+    double balanced;            /* s; time at which the forces on it, as a sleeper, were balanced to its weight */
     double calm;                /* s; for how long its contacts have hardly slipped or opened */
     double open;                /* m/s; approach that a solve leaves open for disks in contact with a rider, see `give_in` */
     double rest;                /* s; for how long it has been at rest: calm by the lower bound for sleep, or staying in
                                    place even if it rattles there */
+    double waits;               /* s; for how long it has to be at rest before it falls asleep */
     double anchor[3];           /* m; where its rest began: x, y, and how far its rim has turned since */
     int stirred;                /* whether a contact slips or opens in this step */
     double entries[3];          /* J; belt work, restitution loss, friction loss so far */
@@ -95,11 +97,12 @@ typedef struct {
     int before;                 /* first of its contacts of the step before, or -1 */
     int queued, moved, jam;     /* marks: of the shock, twice, and of the latest jam */
     int jam_next;               /* the next disk in that jam, or -1 */
-    int island;
+    int bearer;                 /* owner of a surface that supports it, if it sleeps */
+    int frozen;                 /* first of its ends of `World.frozen`, or -1 */
+    int rouses;                 /* the next of the disks that wake together, or -1 */
     int nearby_count;           /* surfaces whose boxes overlap its zone; MAX_NEARBY + 1: too many */
     int held_count;
-    int held[MAX_HELD];         /* surfaces that it lies on ... */
-    double bears[8];            /* N; ... and their forces on it in the latest step, x and y of each */
+    int held[MAX_HELD];         /* surfaces that it lies on */
     int ride_met;               /* surface where a ride ends, or -1 */
     int on;                     /* owner of a surface that it lies on, or -1 */
     int slips;                  /* whether it slips there */
@@ -287,6 +290,7 @@ typedef struct {
     int owner;              /* of the ledger entries */
     int island;             /* disk at the root of its island */
     int next;               /* next of the contacts of disk i in the step before */
+    int frozen;             /* number, from 1 on, of the row of `World.frozen` for this pair and place, or 0 */
     int leaves;             /* it opens in this step */
     int halved;             /* half of its impulse is given before the flight and half after it, see tied.c */
     int hung;               /* number, from 1 on, of the hinge that also gets the impulse, or 0 */
@@ -295,7 +299,24 @@ typedef struct {
     double spot[2];         /* m; ... and the place from the centre of i, in the frame of i */
     double looked[7];       /* m, rad; when the place was looked up: the gap, and x, y and `turned` of i and of j */
     int places, pad;        /* number of places at which the two touched then */
+    double mean[2];         /* N; running mean of its force on i, see sleep.c; NaN before the first step */
 } Contact;
+
+/* A contact of a sleeper with a surface or with another particle, which may be awake. Forces act on i, N. */
+typedef struct {
+    double pressed[3];      /* N, N, N m; the impulses of the contact per time, when the later of both fell asleep */
+    double bore[2], now[2]; /* running mean of its force: when the first of both fell asleep, and now */
+    double felt[2];         /* its force in the latest step */
+    double force[2];        /* its force in the balance of loads of the disk that fell asleep first ... */
+    double more[2];         /* ... and what is added to that in the balance of the other one */
+    double branch[2];       /* m; vector to the centre of i from that of j, or from its foot on a surface */
+    double spot[2];         /* m; the place from the centre of i */
+    double from;            /* s; since when both sleep, or INFINITY */
+    double told;            /* s; time up to which the loads of a single sleeper are reported */
+    double rise;            /* component of the normal against gravity: positive if i lies on j, 0 if they lean on each other */
+    int i, j;               /* as of `Contact` */
+    int first, pad;         /* the one that fell asleep first */
+} Frozen;
 
 /* What the impulses of a solve change of a disk, and how it responds to 1 N s. The first body stands for everything that
    does not move. */
@@ -396,6 +417,9 @@ typedef struct {
     SolverFour *fours;   /* (four_room) the same in single precision */
     LeverFour *lever_fours; /* (four_room) ... and their levers */
     LightBody *light_bodies; /* (disks + 1 + movers) */
+    Frozen *frozen;      /* (2 contacts) contacts of sleepers */
+    int *frozen_links;   /* (4 contacts) row n has the ends 2 n and 2 n + 1: the next end of the same disk, or -1 */
+    double *balance;     /* (disks, 4, 2) room for conjugate gradients */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */
     int *near_links;     /* (2 near) the next place in `near` of the same disk, or -1 */
@@ -435,7 +459,7 @@ typedef struct {
     int pulley;          /* row of the drive pulley among the surfaces, or -1 */
     double ride_incline; /* rad; angle at which the belt rises to the pulley */
     int sweeps;          /* greatest number of sweeps of the contact solver */
-    int sleeps;          /* whether islands may fall asleep */
+    int sleeps;          /* whether particles may fall asleep */
     double gx, gy;       /* m/s2 */
     double up[2];        /* unit vector against gravity */
     double air;          /* [in] kg/m3; density of still air, 0 without */
@@ -447,6 +471,8 @@ typedef struct {
     double accurate;     /* m/s; changes at which sweeps end */
     /* [out] */
     int knot_count, event_count, total_count, contact_count, near_count, earlier_count, swing_count;
+    int frozen_count;
+    int roused;          /* whether rows of `frozen` may have become obsolete */
     int later_count;     /* pairs in `near` beyond `near_count`, added when a path changed within the step; -1: there is
                             no room for them */
     int woken;           /* whether the latest impact has woken any disk */
@@ -729,11 +755,9 @@ typedef struct {
     int overflow;           /* [out] there were to be more bins than MOST_BINS, or than memory has room for */
     double each;            /* [in] s; length of a bin of lasting contacts; 0: they are not recorded */
     Lasting *lasting;       /* [out] bin by bin */
-    Lasting *asleep;        /* forces on sleepers, N; in no order */
     int *seats;             /* hash table of this bin: rows of pairs, + 1 */
-    double *balance;        /* (disks, 4, 2) room for conjugate gradients */
     int lasting_count;      /* [out] */
-    int lasting_room, asleep_count, asleep_room, seat_count, first;
+    int lasting_room, seat_count, first, pad;
     double bin;             /* the bin that begins with row `first` */
 } Loads;
 

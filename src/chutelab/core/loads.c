@@ -10,19 +10,17 @@ Loads B;
 
 EXPORT Loads *loads(void) { return &B; }
 
-EXPORT int lay_out_bins(int owners, int disks) {
+EXPORT int lay_out_bins(int owners) {
     if (B.every > 0.0) {
         B.owner_count = owners;
         B.bin_count = FIRST;
         RESERVE(B.bins, (double)B.bin_count * owners);
     }
     if (B.each > 0.0) {
-        B.lasting_room = B.asleep_room = FIRST;
+        B.lasting_room = FIRST;
         B.seat_count = 2 * FIRST;
         RESERVE(B.lasting, FIRST);
-        RESERVE(B.asleep, FIRST);
         RESERVE(B.seats, B.seat_count);
-        RESERVE(B.balance, 8.0 * disks);
     }
     return has_room();
 }
@@ -146,23 +144,5 @@ void keep_contact(int disk, int other, double from, double to, const double *J, 
     else {
         keep_row(disk, other, bin * B.each, (bin + 1.0) * B.each, 1.0, J[0], J[1], stress);
         *seat = B.overflow ? 0 : B.lasting_count;
-    }
-}
-
-void keep_asleep(int disk, int other, double from, const double *force, const double *b) {
-    if (B.overflow || (B.asleep_count == B.asleep_room && !STRETCH(B.asleep, B.asleep_count, B.asleep_room))) {
-        B.overflow = 1;
-        return;
-    }
-    B.asleep[B.asleep_count++] = (Lasting){ .disk = disk, .other = other, .from = from, .x = force[0], .y = force[1],
-        .stress = {force[0] * b[0], force[0] * b[1], force[1] * b[0], force[1] * b[1]} };
-}
-
-void keep_awake(int disk, double to, double time) {
-    for (int n = B.asleep_count - 1; n >= 0; n--) {
-        const Lasting held = B.asleep[n];
-        if (held.disk != disk) continue;
-        B.asleep[n] = B.asleep[--B.asleep_count];
-        keep_row(disk, held.other, held.from, to, time, held.x, held.y, held.stress);
     }
 }

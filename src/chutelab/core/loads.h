@@ -17,17 +17,11 @@ typedef struct {
 extern Loads B;
 
 /* Reserve the first bins; return 0 if there is no memory. */
-int lay_out_bins(int owners, int disks);
+int lay_out_bins(int owners);
 
 void bear(const Push *p);
 
 /* Record what a lasting contact gave a disk between two times: the impulse J, and b, see `Lasting`. */
 void keep_contact(int disk, int other, double from, double to, const double *J, const double *b);
-
-/* Record the force that holds a sleeper from a time on, until the disk wakes. */
-void keep_asleep(int disk, int other, double from, const double *force, const double *b);
-
-/* Turn the forces that held a disk into impulses of some time, as the disk has woken. */
-void keep_awake(int disk, double to, double time);
 
 #endif

@@ -246,6 +246,7 @@ static void leave(int i, double end) {
 static void stop_all(int reason) {
     for (int i = W.low; i < W.high; i++)
         if (W.disks[i].mode == FREE && W.disks[i].supports && W.tracks[i].lasted) take_back(i);
+    for (Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) melt(f, W.disks[f->i].t);
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         if (d->mode == FREE && d->supports && W.tracks[i].lasted) end_in_contact(i, BY_TIME);
@@ -257,7 +258,6 @@ static void stop_all(int reason) {
         } else if (d->mode == ASLEEP) {
             d->vx = d->ux;
             d->vy = d->uy;
-            bear_asleep(d, d->t, 0);
             if (d->t > W.tracks[i].knot[0]) knot_now(i);
             finish(i, BY_TIME);
         } else if (d->mode == RIDING) {
@@ -458,12 +458,14 @@ static int begin_step(void) {
         tie_joints();
         h = W.step_end - W.t;
     }
+    rouse();
     do {
         W.again = span > 0 ? MIN((W.length + h) / span, MOST_AGAIN) : 1;
+        for (EACH_LIVE(i))
+            if (W.disks[i].mode == ASLEEP) look_ahead(i);
         for (EACH_LIVE(i)) {
             Disk *d = W.disks + i;
             d->halved = 0;
-            if (d->mode == ASLEEP) look_ahead(i);
             if (d->mode == RIDING) ride_on(d, W.t, W.step_end);
             if (d->mode == ASLEEP) {
                 d->vx = d->ux - 0.5 * W.gx * h;
@@ -675,7 +677,7 @@ static int is_over(int *reason) {
     for (EACH_LIVE(i)) {
         const Disk *d = W.disks + i;
         if (d->mode == RIDING || d->mode == FREE) awake = 1;
-        if (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs)) awake = 1;
+        if (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs || d->stirred)) awake = 1;
     }
     if (awake && !W.hinges) return 0;
     for (int i = W.low; i < W.high; i++) {
@@ -708,7 +710,7 @@ static int begin_part(void) {
     W.low = W.high;
     if (W.low >= W.disk_count) return 0;
     W.high = W.interact ? W.disk_count : W.low + 1;
-    W.contact_count = W.earlier_count = W.live_count = 0;
+    W.contact_count = W.earlier_count = W.live_count = W.frozen_count = 0;
     W.t = W.disks[W.low].release;
     W.smallest = W.low;
     for (int i = W.low; i < W.high; i++) {
@@ -716,7 +718,8 @@ static int begin_part(void) {
         if (d->radius < W.disks[W.smallest].radius) W.smallest = i;
         d->left = d->bottom = INFINITY;
         d->right = d->top = -INFINITY;
-        d->before = d->links = d->nears = -1;
+        d->before = d->links = d->nears = d->frozen = -1;
+        d->waits = CALM_DOWN / W.pace;
         d->inv_mass = 1 / d->mass;
         d->inv_inertia = d->inertia > 0 ? 1 / d->inertia : 0;
         d->heap_place = -1;
@@ -732,8 +735,6 @@ static int begin_part(void) {
     }
     return 1;
 }
-
-enum Phase { PART, STEP, WITHIN };
 
 /* A disk by itself is released outside of steps, and needs none while it rides. */
 static int begin_alone(void) {

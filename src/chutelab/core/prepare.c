@@ -254,19 +254,26 @@ static void make_near_room(int room) {
     RESERVE(W.near_links, 2.0 * room);
 }
 
-/* Make room for contacts; those of the step before are kept. */
+/* Make room for contacts; those of the step before and those of sleepers are kept. */
 static void make_contact_room(int room) {
     const Contact *old = W.earlier;
+    const Frozen *frozen = W.frozen;
+    const int *links = W.frozen_links;
     W.contact_room = room;
     RESERVE(W.contacts, room);
     RESERVE(W.earlier, room);
     RESERVE(W.links, 2.0 * room);
+    RESERVE(W.frozen, 2.0 * room);
+    RESERVE(W.frozen_links, 4.0 * room);
     RESERVE(W.rows, room + 3.0 * W.mover_count);
     RESERVE(W.levers, W.outline_count || W.mover_count ? room + 3.0 * W.mover_count : 0);
     W.four_room = W.interact ? room / 4 : 0;
     RESERVE(W.fours, W.four_room);
     RESERVE(W.lever_fours, W.outline_count || W.mover_count ? W.four_room : 0);
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
+    if (!has_room() || !W.frozen_count) return;
+    memcpy(W.frozen, frozen, W.frozen_count * sizeof(Frozen));
+    memcpy(W.frozen_links, links, 2 * W.frozen_count * sizeof(int));
 }
 
 /* Double the room for states of hinges; return whether there is memory. */
@@ -293,6 +300,7 @@ static int lay_out_work(void) {
     for (W.bucket_count = 1; crowd && W.bucket_count <= 4 * n + 16;) W.bucket_count *= 2;
     W.cell_room = crowd ? 12 * n + 64 : 1;
     RESERVE(W.tracks, n);
+    RESERVE(W.balance, crowd ? 8.0 * n : 0);
     RESERVE(W.solver_bodies, n + 1.0 + W.mover_count);
     RESERVE(W.edges, 3.0 * W.outline_count);
     RESERVE(W.poses, W.outline_count ? 6.0 * n : 0);

@@ -182,6 +182,18 @@ void track_ended(int i) {
     memcpy(track->after_entries, d->entries, sizeof track->after_entries);
 }
 
+/* Let a track go on in lasting contact from the knot just written: the disk was in contact before it slept. */
+void last_on(int i) {
+    const Disk *d = W.disks + i;
+    Track *track = W.tracks + i;
+    memcpy(track->held, track->knot, sizeof track->held);
+    memcpy(track->past, track->held, sizeof track->past);
+    memcpy(track->after, &d->vx, sizeof track->after);
+    memcpy(track->after_entries, d->entries, sizeof track->after_entries);
+    track->angles[1] = d->turned;
+    track->lasted = 1;
+}
+
 /* Note the state of a disk in flight whose path is bent by air. */
 void track_flying(int i) {
     const Disk *d = W.disks + i;

@@ -151,7 +151,7 @@ EXPORT int prepare_to_judge(void) {
         L.bodies[i] = (Body){ .radius = d->radius, .mass = d->mass, .inertia = d->inertia, .gravity = w->g };
         L.largest = MAX(L.largest, d->radius);
     }
-    return prepare() && lay_out_bins(w->owner_count, w->disk_count);
+    return prepare() && lay_out_bins(w->owner_count);
 }
 
 static int judge_world(void) {

@@ -257,7 +257,7 @@ void solve_contacts(int again) {
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
         double least = INFINITY, heaviest = 0;
-        int driven = 0, cornered = 0, tied = 0, stirred = 0, halved = 1;
+        int driven = 0, pushed = 0, cornered = 0, tied = 0, stirred = 0, rests = 0, halved = 1;
         W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
@@ -265,14 +265,16 @@ void solve_contacts(int again) {
             least = MIN(least, MIN(a->radius, b->radius));
             heaviest = MAX(heaviest, MAX(a->mass, b->mass));
             driven |= presses(c);
+            pushed |= c->moved[0] > 0;
             W.swings_too |= c->hung > 0;
             cornered |= c->cornered;
+            rests |= sleeps(c->j);
             tied |= is_tied(c->i) || is_tied(c->j);
             stirred |= (a->supports && a->rest == 0) || (b->supports && b->rest == 0);
         }
         swings |= W.swings_too;
         for (int n = from; n < to && !again; n++) halved &= W.contacts[n].clings == 0 && W.contacts[n].turns == 0;
-        halved &= tied && W.interact && !W.swings_too && to - from <= FEW_CONTACTS;
+        halved &= tied && !rests && W.interact && !W.swings_too && to - from <= FEW_CONTACTS;
         for (int n = from; n < to && !again; n++) {
             Contact *c = W.contacts + n;
             c->halved = W.disks[c->i].halved = halved;
@@ -286,14 +288,17 @@ void solve_contacts(int again) {
         }
         double accurate = W.accurate;
         int sweeps = W.sweeps;
-        if ((cornered || tied || W.swings_too) && to - from <= FEW_CONTACTS) accurate = FINE_FEW * W.pace;
+        int few = to - from <= FEW_CONTACTS && (!rests || are_few(W.contact_count));
+        if ((cornered || tied || W.swings_too) && few) accurate = FINE_FEW * W.pace;
         else if (cornered) {
             accurate = CROWD_CORNERS * accurate;
             if (stirred) sweeps = (int)(FEWER * sweeps);
         }
-        if (W.interact)
-            sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), sweeps,
-                           PLAIN, accurate, W.skip * least);
+        /* Between a surface that pushes and sleepers, which do not give way, there may be no room: they wake. */
+        for (Contact *c = list; c < list + to - from && pushed && rests; c++)
+            if (sleeps(c->j)) W.disks[c->j].stirred = 1;
+        int rounds = pushed && rests ? 1 : MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS);
+        if (W.interact) sweep_contacts(list, to - from, rounds, sweeps, PLAIN, accurate, W.skip * least);
         else solve_alone(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);

@@ -146,6 +146,9 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     }
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     for (int n = 0; n < 3 && last; n++) c->impulse[n] = W.again * last->impulse[n];
+    for (int n = 0; n < 2; n++) c->mean[n] = last ? last->mean[n] : NAN;
+    c->frozen = find_frozen(c);
+    if (c->frozen && !last) start_from_frozen(c, 0.5 * (W.length_before + h));
     int was_pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
     /* A disk that was pressed comes down from its last hop. It may leave along the surface, not into it, and until it
        reaches the end of the face it hops. Beyond, the end presses it only if it is slow enough. */
@@ -255,14 +258,24 @@ static int list_places(int i, int j, double h, Places *at) {
     return at->count;
 }
 
+/* Whether one of two moves too fast on the other, a sleeper, to rest on it: its velocity, without its last hop, is more than
+   gravity gives in a step. */
+static int stirs_sleeper(const Disk *a, const Disk *b) {
+    const Disk *d = a->mode == ASLEEP ? b : a, *sleeper = d == a ? b : a;
+    double x = d->vx - sleeper->ux - 0.5 * W.gx * W.length, y = d->vy - sleeper->uy - 0.5 * W.gy * W.length;
+    return d->mode == FREE && square(x) + square(y) > square(0.5 * W.soft);
+}
+
 /* List the contacts of the step and wake the sleepers among them. Return 0 if there is no room. */
 int find_contacts(double h, int *woke) {
     Places places;
+    int few = are_few(W.earlier_count);
     W.contact_count = 0;
     *woke = 0;
     for (int n = 0; n < W.near_count; n++) {
         int i = W.near[2 * n], j = W.near[2 * n + 1], cornered = is_cornered(i, j);
-        if (cornered && !W.disks[i].corners) { int k = i; i = j; j = k; }
+        int both = cornered && W.disks[i].corners && W.disks[j].corners;
+        if (cornered && (both ? W.disks[i].mode != FREE : !W.disks[i].corners)) { int k = i; i = j; j = k; }
         Disk *a = W.disks + i, *b = W.disks + j;
         double least = MIN(a->radius, b->radius), reach = a->radius + b->radius + TOUCH * least;
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
@@ -272,8 +285,8 @@ int find_contacts(double h, int *woke) {
         double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least, 0);
         if (cornered) bound = MAX(bound, left_over(b, impacts, -1, least, 0));
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
-            bound = MAX(bound, cornered ? (W.earlier_count > FEW_CONTACTS ? LATEST : 1) * W.soft : MAX(W.soft, W.skip * least));
-        if (a->mode == ASLEEP || b->mode == ASLEEP) {
+            bound = MAX(bound, cornered ? (few ? 1 : LATEST) * W.soft : MAX(W.soft, W.skip * least));
+        if ((a->mode == ASLEEP || b->mode == ASLEEP) && ((cornered && (!both || few)) || stirs_sleeper(a, b))) {
             wake(a->mode == ASLEEP ? i : j, W.t);
             *woke = 1;
         }

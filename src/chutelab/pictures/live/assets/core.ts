@@ -219,7 +219,7 @@ class Core extends Memory {
     });
     this.work("prepare");
     this.set("every", machine.loads, "Loads");
-    if (machine.loads) this.work("lay_out_bins", machine.surfaces.length, 0);
+    if (machine.loads) this.work("lay_out_bins", machine.surfaces.length);
   }
 
   pair(

@@ -570,3 +570,31 @@ def test_what_no_engine_joins_is_refused_by_its_key():
         simulate(scene(1.0, **two, string=[{"from": [0.0, 0.0]}]))
     with pytest.raises(SceneError, match="interact"):
         from_dict(scene(1.0, **two, rod=[{"other": 1}]))
+
+
+@pytest.mark.parametrize("slack", [1e-4, pytest.param(1e-3, marks=pytest.mark.slow)])
+def test_a_rope_bridge_hangs_between_two_fixed_points(slack):
+    """Of 20 balls, by `slack` of each string longer than its span: no string gets longer.
+
+    A span of 1 m with the slack s sags by sqrt(3 s / 8) m as a parabola, 6 mm at the least here;
+    what swings has fallen by at most twice as much. Tracks are off by two hops, g dt² / 8 each, at
+    both ends of a string. (A step whose pull is no number is halved.)
+    """
+    count, x = 20, np.linspace(-0.5, 0.5, 22)
+    length = (1.0 + slack) / (count + 1)
+    ends = [{"particle": 0, "from": [-0.5, 0.0]}, {"particle": count - 1, "from": [0.5, 0.0]}]
+    inner = [{"particle": n, "other": n - 1} for n in range(1, count)]
+    run = simulate({
+        "particle": {"radius": 0.02, "mass": 0.05, "spin": True},
+        "surface": [{"name": "floor", "from": [-1.0, -0.6], "to": [1.0, -0.6]}],
+        "string": [{**one, "length": length} for one in (*ends, *inner)],
+        "stream": [{"at": [at, 0.0], "velocity": [0.0, 0.0], "interact": True} for at in x[1:-1]],
+        "run": {"until": 0.3},
+    }, engine="contact")  # fmt: skip
+    assert not run.laws
+    places = run.at(np.linspace(0.0, 0.299, 100)).position
+    fixed = np.broadcast_to([[[-0.5, 0.0]], [[0.5, 0.0]]], (2, len(places), 2))
+    rope = np.concatenate([fixed[0][:, None], places, fixed[1][:, None]], axis=1)
+    assert np.hypot(*np.diff(rope, axis=1).T).max() < length + 4.0 * 1.23e-6
+    sag = (3.0 * slack / 8.0) ** 0.5
+    assert 0.5 * sag < -rope[..., 1].min() < 2.0 * sag

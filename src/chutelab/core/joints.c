@@ -22,6 +22,9 @@
 /* Share of the diagonal: a row with a smaller pivot depends on the others. */
 #define DEPENDS 1e-13
 
+/* m/s; a pull that would give a particle more is a failure of Newton's method. */
+#define WILD 1e6
+
 /* Share of the usual step; in a shorter one velocities are more exact than lengths. */
 #define BRIEF 0.1
 
@@ -267,6 +270,18 @@ void forget_tugs(void) {
     }
 }
 
+/* Whether a pull is too large, or no number; then there is none. */
+static int drop_wild_pull(void) {
+    int wild = 0;
+    for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
+        double mass = W.disks[j->particle].inv_mass + (j->other < 0 ? 0 : W.disks[j->other].inv_mass);
+        for (int n = 0; n < rows_of(j); n++) wild |= !(fabs(W.joint_rows[j->row + n].kick) * mass < WILD);
+    }
+    for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count && wild; r++) r->kick = 0;
+    if (wild) pull();
+    return wild;
+}
+
 /* By how much of its length a string that is let go though it is tight gets longer within h. */
 static double longer(const Joint *j, double h) {
     double d[4];
@@ -317,6 +332,9 @@ void pull_joints(double h) {
             solve();
             for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++)
                 if (r->on) r->kick += r->off;
+            if (!drop_wild_pull()) continue;
+            worst = 1;
+            break;
         }
         missed = worst > BAND ? worst : 0;
         is_rough = worst > FINE;

@@ -1,6 +1,8 @@
 /* Gauss-Seidel sweeps over the rows of a crowd, four rows at a time, in single precision. That is enough, as they end
    when velocities change by 1e-5 of their size. Rows of one colour share no disk, so one vector instruction can solve
-   four of them. rows.c takes the impulses over in double precision, and explains what a row does. */
+   four of them. Where two particles with corners touch at two places, the two rows are twins: of four such pairs of rows
+   the bodies are loaded and stored once. rows.c takes the impulses over in double precision, and explains what a row
+   does. */
 
 #include "core.h"
 
@@ -12,7 +14,8 @@
 /* Replaces infinity, which cannot be multiplied by 0. */
 #define ANY 1e30f
 
-static int fours, bodies;
+/* Numbers of fours, of pairs of fours for twins, which come first, and of bodies. */
+static int fours, twins, bodies;
 
 typedef v128_t Four;
 
@@ -57,13 +60,11 @@ static inline void scatter(LightBody *to, const int *which, Four *v) {
     for (int k = 0; k < 4; k++) set(&to[which[k]].x, v[k]);
 }
 
-/* `give` of rows.c for four rows; `rolls` and `cornered` are true if they are for any row of all. Each loop over it has a
-   copy of its own, in which both are known. */
-static inline __attribute__((always_inline)) Four give(SolverFour *f, LightBody *body, int rolls, int cornered) {
+/* `give` of rows.c for four rows with the velocities of their bodies; `rolls` and `cornered` are true if they are for any
+   row of all. Each loop over it has a copy of its own, in which both are known. */
+static inline __attribute__((always_inline)) Four give(SolverFour *f, Four *a, Four *b, int rolls, int cornered) {
     const LeverFour *l = W.lever_fours + (cornered ? f - W.fours : 0);
-    Four a[4], b[4], nx = get(f->nx), ny = get(f->ny), J = get(f->impulse), T = get(f->along), mass = get(f->mass);
-    gather(body, f->a, a);
-    gather(body, f->b, b);
+    Four nx = get(f->nx), ny = get(f->ny), J = get(f->impulse), T = get(f->along), mass = get(f->mass);
     Four x = less(a[0], b[0]), y = less(a[1], b[1]);
     Four opens = sum(sum(by(x, nx), by(y, ny)), get(f->opens));
     Four turn = sum(a[2], b[2]);
@@ -105,6 +106,18 @@ static inline __attribute__((always_inline)) Four give(SolverFour *f, LightBody 
     b[0] = less(b[0], by(get(f->mass_b), px));
     b[1] = less(b[1], by(get(f->mass_b), py));
     b[2] = sum(b[2], rb);
+    return change;
+}
+
+/* Load the bodies of four rows, solve these, if `both` also the next four, which are their twins, and store them.
+   `way` is 1 or -1: forwards or backwards. */
+static inline __attribute__((always_inline)) Four give_and_store(SolverFour *f, int both, int way, LightBody *body,
+                                                                 int rolls, int cornered) {
+    Four a[4], b[4], change = all(0);
+    gather(body, f->a, a);
+    gather(body, f->b, b);
+    SolverFour *one = f + (both && way < 0);
+    for (int left = both; left >= 0; left--, one += way) change = high(change, give(one, a, b, rolls, cornered));
     scatter(body, f->a, a);
     scatter(body, f->b, b);
     return change;
@@ -151,9 +164,12 @@ static inline double sweep(int sweeps, int plain, double accurate, double most, 
     for (int n = 0; n < sweeps; n++) {
         Four change = all(0);
         if (n >= plain && (n - plain) % 2 == 0) age = hasten(n == plain ? 0 : age, rolls);
-        int way = (sweeps - n) % 2 ? 1 : -1;
-        SolverFour *f = W.fours + (way > 0 ? 0 : fours - 1);
-        for (int left = fours; left > 0; left--, f += way) change = high(change, give(f, body, rolls, cornered));
+        int way = (sweeps - n) % 2 ? 1 : -1, loads = fours - twins;
+        for (int k = 0; k < loads; k++) {
+            int load = way > 0 ? k : loads - 1 - k, both = cornered && load < twins;
+            SolverFour *f = W.fours + load + (both ? load : twins);
+            change = high(change, give_and_store(f, both, way, body, rolls, cornered));
+        }
         worst = greatest(change);
         W.sweep_count++;
         if (worst <= accurate) return worst;
@@ -164,36 +180,58 @@ static inline double sweep(int sweeps, int plain, double accurate, double most, 
 
 static inline float bounded(double a) { return (float)MIN(a, ANY); }
 
+/* Give the rows of all colours their places in fours, `each` fours for four of them, from `fours` on. */
+static void place_colours(int *begin, int each) {
+    for (int k = 0; k <= COLOURS; k++) {
+        int many = begin[k];
+        begin[k] = 4 * fours;
+        fours += each * (k < COLOURS ? (many + 3) / 4 : many);
+    }
+}
+
 /* Colour the rows and copy them into fours. Return whether there is room for them; set whether any has rolling friction. */
 static int set_fours(int rows, int cornered, int *rolls) {
-    int begin[COLOURS + 1] = {0};
-    fours = 0;
+    int single[COLOURS + 1] = {0}, twin[COLOURS + 1] = {0};
     for (int n = 0; n < rows; n++) {
         SolverRow *r = W.rows + n;
         SolverBody *a = W.solver_bodies + r->a, *b = W.solver_bodies + r->b;
+        *rolls |= r->arm > 0;
+        r->twin = cornered && n > 0 && r[-1].a == r->a && r[-1].b == r->b && !r[-1].twin && r[-1].colour < COLOURS;
+        if (r->twin) {
+            single[r[-1].colour]--;
+            twin[r[-1].colour]++;
+            continue;
+        }
         int used = r->b ? a->used | b->used : a->used, colour = 0;
         while (colour < COLOURS && used >> colour & 1) colour++;
         a->used |= 1 << colour;
         b->used |= 1 << colour;
         r->colour = colour;
-        begin[colour]++;
-        *rolls |= r->arm > 0;
+        single[colour]++;
     }
-    for (int k = 0; k <= COLOURS; k++) {
-        int many = begin[k];
-        begin[k] = 4 * fours;
-        fours += k < COLOURS ? (many + 3) / 4 : many;
-    }
+    fours = 0;
+    place_colours(twin, 2);
+    twins = fours / 2;
+    place_colours(single, 1);
     if (fours > W.four_room) return 0;
-    for (int n = 0; n < fours; n++) W.fours[n] = (SolverFour){.nx = {0}};
+    for (int n = 0; n < fours; n++) W.fours[n] = (SolverFour){.a = {0}};
     for (int n = 0; n < fours && cornered; n++) W.lever_fours[n] = (LeverFour){.own = {0}};
     for (int n = 0; n < rows; n++) {
         SolverRow *r = W.rows + n;
         const SolverBody *a = W.solver_bodies + r->a, *b = W.solver_bodies + r->b;
-        int *at = begin + r->colour, k = *at % 4;
-        SolverFour *f = W.fours + *at / 4;
-        r->four = *at;
-        *at += r->colour < COLOURS ? 1 : 4;
+        int has_twin = n + 1 < rows && r[1].twin;
+        if (r->twin) r->four = r[-1].four + 4;
+        else if (has_twin) {
+            int *at = twin + r->colour;
+            r->four = *at;
+            *at += *at % 4 < 3 ? 1 : 5;
+        } else {
+            int *at = single + r->colour;
+            r->four = *at;
+            *at += r->colour < COLOURS ? 1 : 4;
+        }
+        int k = r->four % 4;
+        SolverFour *f = W.fours + r->four / 4;
         f->a[k] = r->a;
         f->b[k] = r->b;
         f->nx[k] = (float)r->normal[0];

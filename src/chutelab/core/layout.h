@@ -345,7 +345,7 @@ typedef struct {
     int a, b;               /* bodies */
     int from;               /* number of its contact in the list */
     int colour, four;       /* see `SolverFour`; its place among their numbers */
-    int pad;
+    int twin;               /* whether the row before is another place of the same two, see fours.c */
 } SolverRow;
 
 /* Levers of a row with corners or a hinge: change of the rim of both bodies by its impulses, in their radii; and change
@@ -355,12 +355,12 @@ typedef struct { double own[2], others[2], slips, pad; } RowLever;
 /* Four rows for sweeps in single precision. Fields have the names of `SolverRow`, except those of x and y, and of normal
    and slip. */
 typedef struct {
-    float nx[4], ny[4], opens[4], slips[4], mass[4], slide_mass[4], light[4], slide_light[4];
-    float gives[4], eases[4], more[4], parts[4], rough[4], arm[4], spin[4], roll_mass[4], roll_light[4];
-    float mass_a[4], mass_b[4], turn_a[4], turn_b[4], twist_a[4], twist_b[4], bend_a[4], bend_b[4];
-    float impulse[4], swept[4], course[4], along[4], slide_swept[4], slide_course[4];
-    float moment[4], roll_swept[4], roll_course[4];
     int a[4], b[4];
+    float nx[4], ny[4], opens[4], slips[4], mass[4], slide_mass[4], light[4], slide_light[4];
+    float gives[4], eases[4], more[4], parts[4], rough[4], mass_a[4], mass_b[4], turn_a[4], turn_b[4];
+    float impulse[4], along[4], swept[4], course[4], slide_swept[4], slide_course[4];
+    float arm[4], spin[4], roll_mass[4], roll_light[4], twist_a[4], twist_b[4], bend_a[4], bend_b[4];
+    float moment[4], roll_swept[4], roll_course[4];
 } SolverFour;
 
 /* The levers of four rows. */

@@ -338,6 +338,11 @@ int lies_flat(int i, int k);
 int list_struck(int i, int j, double t, Contact *list);
 void strike_corners(int i, int j, double t);
 
+/* blow.c */
+void give_all(const Contact *c, const double *impulse);
+void find_matrix(Contact *list, int count, double size, int joined);
+double solve_with_energy(Contact *list, int count, double *back, const double (*u)[3]);
+
 /* trigger.c */
 int is_triggered(int owner, int doing);
 void touch(int owner, double t);

@@ -24,17 +24,6 @@
 #define DEEP 0.2
 /* The same for a place beyond an end. */
 #define ROUNDED 1e-6
-/* Greatest number of sweeps over the places of an impact, the share of its size at which they end, and the number of
-   sweeps before the first direct solve. */
-#define SWEEPS 2000
-#define ENDS 1e-15
-#define DIRECT 4
-/* Share of a diagonal element of the matrix; a smaller pivot is rounding, where two impulses have the same effect. */
-#define SAME 1e-6
-/* Share of the velocity that an impulse would change without joints; if it changes less, the joints hold the place. */
-#define HELD 1e-13
-/* Share of an impact's energy that it may gain by rounding. */
-#define GAINS 1e-12
 /* Share of a speed; a smaller approach velocity may be rounding and is no impact. */
 #define ROUNDS 1e-14
 /* Distance, in radii of the inner circle, by which two particles of a crowd may move before their places are looked up
@@ -903,172 +892,6 @@ RARELY int lies_flat(int i, int k) {
     return lies;
 }
 
-/* Whether a struck particle has joints, which respond to each impulse of the impact. */
-static int answers;
-
-static void give_all(const Contact *c, const double *impulse) {
-    push(c, impulse);
-    if (answers) answer_with_joints();
-}
-
-/* The matrix of an impact: how impulses and moments at its places change normal velocity, slip and spin at all places,
-   1/kg. */
-static double matrix[3 * MOST_TOUCHES][3 * MOST_TOUCHES];
-
-/* Scalar product of two directions, normal (0) or tangent (1), at two places; 0 for a moment (2), which has none. */
-static double along_both(const Contact *c, int n, const Contact *o, int k) {
-    if (n == 2 || k == 2) return 0;
-    if (n == k) return c->nx * o->nx + c->ny * o->ny;
-    double cross = c->nx * o->ny - c->ny * o->nx;
-    return n ? -cross : cross;
-}
-
-/* Set the matrix of an impact. If joints respond, it is measured by impulses that change velocities by about `size`, m/s,
-   and are taken back; joints may hold a place entirely. */
-static void find_matrix(Contact *list, int count, double size) {
-    for (int m = 0; m < 3 * count; m++) {
-        const Contact *c = list + m / 3;
-        const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-        double one[3] = {0, 0, 0}, back[3] = {0, 0, 0}, u[MOST_TOUCHES][3], v[3];
-        double mass = a->inv_mass + (c->two ? b->inv_mass : 0);
-        if (m % 3 == 2 && c->arm == 0) continue;
-        for (int n = 0; n < count && answers; n++) relative(list + n, 0, u[n]);
-        one[m % 3] = size * a->mass;
-        back[m % 3] = -one[m % 3];
-        if (answers) give_all(c, one);
-        for (int n = 0; n < count; n++) {
-            const Contact *o = list + n;
-            if (answers) relative(o, 0, v);
-            for (int k = 0; k < 3; k++) {
-                double *to = &matrix[3 * n + k][m];
-                if (answers) {
-                    double gives = (v[k] - u[n][k]) / one[m % 3];
-                    *to = 3 * n + k == m && !(gives > HELD / a->mass) ? 0 : gives;
-                    continue;
-                }
-                double own = k < 2 ? o->own[k] : 1, others = k < 2 ? o->others[k] : -1;
-                *to = mass * along_both(o, k, c, m % 3) + own * (m % 3 < 2 ? c->own[m % 3] : 1) * a->inv_inertia;
-                if (c->two) *to += others * (m % 3 < 2 ? c->others[m % 3] : -1) * b->inv_inertia;
-                if (c->hung) *to += o->lever[k] * c->lever[m % 3] / W.movers[c->hung - 1].inertia;
-            }
-        }
-        if (answers) give_all(c, back);
-    }
-    if (answers) forget_answers();
-}
-
-/* Bound on a tangential impulse or a moment per normal impulse. */
-static double bound_of(const Contact *c, int n, double share) {
-    if (n == 1) return share * MIN(c->friction, share < 1 ? ROUGH : INFINITY);
-    return answers ? 0 : share * c->arm;
-}
-
-/* Solve for all impulses at once, under the assumption that those that are free after the sweeps stay free and the others
-   stay at their bounds; the sweeps that follow check that. Not with joints, as their response is not known exactly
-   enough. */
-static void solve_directly(Contact *list, int count, const double *back, double share, double *v) {
-    double rows[3 * MOST_TOUCHES][3 * MOST_TOUCHES + 1], bound[3 * MOST_TOUCHES];
-    int free[3 * MOST_TOUCHES], many = 0;
-    for (int m = 0; m < 3 * count; m++) {
-        const double *J = list[m / 3].impulse;
-        double most = m % 3 ? bound_of(list + m / 3, m % 3, share) : 0;
-        bound[m] = J[m % 3] > 0 ? most : -most;
-        if (m % 3 ? fabs(J[m % 3]) < most * J[0] : J[0] > 0) {
-            free[many++] = m;
-            bound[m] = 0;
-        }
-    }
-    for (int n = 0; n < many; n++) {
-        int m = free[n];
-        rows[n][many] = (m % 3 ? 0 : back[m / 3]) - v[m];
-        for (int k = 0; k < many; k++) {
-            int o = free[k];
-            rows[n][k] = matrix[m][o];
-            for (int with = o + 1; o % 3 == 0 && with < o + 3; with++)
-                if (bound[with] != 0) rows[n][k] += matrix[m][with] * bound[with];
-        }
-    }
-    for (int n = 0; n < many; n++)
-        for (int k = 0; k < many; k++) {
-            if (k == n || !(fabs(rows[n][n]) > SAME * matrix[free[n]][free[n]])) continue;
-            double by = rows[k][n] / rows[n][n];
-            for (int o = n; o <= many && by != 0; o++) rows[k][o] -= by * rows[n][o];
-        }
-    for (int n = 0; n < many; n++) {
-        int m = free[n];
-        double *J = list[m / 3].impulse;
-        if (!(fabs(rows[n][n]) > SAME * matrix[m][m])) continue;
-        double more = rows[n][many] / rows[n][n];
-        for (int o = m; o < (m % 3 ? m + 1 : m + 3); o++) {
-            double change = o == m ? more : bound[o] * more;
-            J[o % 3] += change;
-            for (int k = 0; k < 3 * count && change != 0; k++) v[k] += matrix[k][o] * change;
-        }
-    }
-}
-
-/* Find impulses at all places such that no gap closes, or that it opens as fast as restitution asks for; friction, scaled
-   by `share`, stops slip within its bound, and rolling friction the rolling of a disk, unless there are joints. */
-static void solve_impact(Contact *list, int count, const double *back, double share) {
-    double size = 0, v[3 * MOST_TOUCHES];
-    for (int n = 0; n < count; n++) {
-        size = MAX(size, back[n]);
-        relative(list + n, 0, v + 3 * n);
-    }
-    for (int sweep = 0, direct = DIRECT; sweep < SWEEPS; sweep++) {
-        double worst = 0;
-        if (sweep == direct && !answers) {
-            solve_directly(list, count, back, share, v);
-            direct *= DIRECT;
-        }
-        for (int m = 0; m < 3 * count; m++) {
-            const Contact *c = list + m / 3;
-            if (m % 3 == 2 && c->arm == 0) continue;
-            double *J = list[m / 3].impulse, gives = matrix[m][m], most = INFINITY, least = 0;
-            if (m % 3) {
-                most = bound_of(c, m % 3, share) * J[0];
-                least = -most;
-            } else size = MAX(size, fabs(v[m]) + fabs(v[m + 1]));
-            double wanted = J[m % 3] + (gives > 0 ? ((m % 3 ? 0 : back[m / 3]) - v[m]) / gives : 0);
-            double change = MIN(MAX(wanted, least), most) - J[m % 3];
-            if (change == 0) continue;
-            J[m % 3] += change;
-            if (m % 3 < 2) size = MAX(size, fabs(J[m % 3]) * gives);
-            for (int k = 0; k < 3 * count; k++) v[k] += matrix[k][m] * change;
-            worst = MAX(worst, fabs(change) * gives * (m % 3 < 2 ? 1 : W.disks[MAX(c->j, 0)].radius));
-        }
-        if (worst <= ENDS * size) break;
-    }
-    for (int n = 0; n < count; n++) give_all(list + n, list[n].impulse);
-}
-
-/* Find the impulses of an impact. Newton's restitution with friction, or at several places, may seem to create energy if
-   one impulse changes the velocity at another place (T. R. Kane, J. Appl. Mech. 51, 1984). Then friction is reduced, and
-   finally restitution is 0, which never creates energy. `u` are the velocities before. Return the loss, J. */
-static double solve_with_energy(Contact *list, int count, double *back, const double (*u)[3]) {
-    for (double share = 1;;) {
-        double lost = 0, size = 0, v[3];
-        solve_impact(list, count, back, share);
-        for (int n = 0; n < count; n++) {
-            const double *J = list[n].impulse;
-            relative(list + n, 0, v);
-            lost -= 0.5 * (J[0] * (u[n][0] + v[0]) + J[1] * (u[n][1] + v[1]) + J[2] * (u[n][2] + v[2]));
-            size += fabs(J[0] * u[n][0]) + fabs(J[1] * u[n][1]);
-        }
-        int is_plastic = 1;
-        for (int n = 0; n < count; n++) is_plastic &= back[n] == 0;
-        if (lost >= -GAINS * size || is_plastic) return lost;
-        for (int n = 0; n < count; n++) {
-            Contact *c = list + n;
-            double none[3] = {-c->impulse[0], -c->impulse[1], -c->impulse[2]};
-            give_all(c, none);
-            c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
-            if (share == 0) back[n] = 0;
-        }
-        share = share > 0.1 ? 0.5 * share : share > 0 ? 0 : 1;
-    }
-}
-
 /* Resolve the impact of particle i, which has corners, with j, at all places at which they touch. */
 RARELY void strike_corners(int i, int j, double t) {
     Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
@@ -1078,7 +901,7 @@ RARELY void strike_corners(int i, int j, double t) {
     if (j < 0 && is_hung(-1 - j)) strike_hinge(W.surfaces[-1 - j].mover, t);
     end_hops(i, t);
     if (j >= 0 && b->mode == FREE) end_hops(j, t);
-    answers = is_tied(i) || is_tied(j);
+    int answers = is_tied(i) || is_tied(j);
     if (answers) strike_joints(i, j);
     int count = list_struck(i, j, t, list), two = j >= 0 && b->mode == FREE;
     for (int n = 0; n < count; n++) {
@@ -1103,7 +926,7 @@ RARELY void strike_corners(int i, int j, double t) {
     for (int again = 1; again;) {
         double wanted[MOST_TOUCHES];
         memcpy(wanted, back, sizeof back);
-        find_matrix(list, count, fastest);
+        find_matrix(list, count, fastest, answers);
         lost = solve_with_energy(list, count, wanted, u);
         int lets_go = answers && let_go_again();
         again = lets_go || hold_hinge(list, count, u, back);

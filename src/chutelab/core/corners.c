@@ -14,7 +14,7 @@
 #define STRIDES 8
 /* rad; a particle that rotates by more in a span may leave something round by one corner and meet it with the next. */
 #define ROLLS 0.05
-/* Greatest number of iterations to the instant of an impact; bisections reach its last bit ... */
+/* Greatest number of iterations to the instant of an impact; bisections reach its last bit if need be ... */
 #define TO_ROOT 200
 /* ... and the number of faster steps before them. */
 #define QUICK 20
@@ -28,7 +28,7 @@
 #define ROUNDS 1e-14
 /* Distance, in radii of the inner circle, by which two particles of a crowd may move before their places are looked up
    again; the gap is then wrong by its square. */
-#define STILL 2e-4
+#define STILL 5e-4
 /* Candidates for places: corners of both. */
 #define CANDIDATES (2 * MOST_CORNERS)
 
@@ -516,15 +516,17 @@ static double least_gap(int i, int j, const Shape *a, const Shape *b, double t, 
 }
 
 /* The instant within (low, high] at which the gap of a candidate closes, from `above` 0 to `below`. False position with
-   the Illinois rule, which halves the value at an end that stays; then bisection to the last bit. */
+   the Illinois rule, which halves the value at an end that stays, then bisection, until the gap is as small as the rounding
+   of a place. */
 static double root_of(int i, int j, Touch *at, double low, double high, double above, double below) {
-    double near = TOUCH * inner_of(i, j);
-    for (int n = 0, side = 0; n < TO_ROOT && below < 0; n++) {
+    double near = TOUCH * inner_of(i, j), rounding = 0;
+    for (int n = 0, side = 0; n < TO_ROOT && below < -rounding; n++) {
         double middle = n < QUICK ? high + (high - low) * below / (above - below) : 0.5 * (low + high);
         if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
         if (!(middle > low && middle < high)) break;
         Shape a = shape_of(i, middle), b = shape_of(j, middle);
         double gap = gap_at(&a, &b, near, at);
+        rounding = EPS * (fabs(a.x) + fabs(a.y));
         if (gap > 0) {
             low = middle;
             above = gap;
@@ -763,9 +765,9 @@ static double gap_change_since(const Contact *c) {
     return (pose[0] - pose[3]) * c->nx + (pose[1] - pose[4]) * c->ny + c->own[0] * pose[2] + c->others[0] * pose[5];
 }
 
-/* If two of a crowd have hardly moved since their places were looked up, list their contacts of the step before; return 0
-   if the places have to be looked up. */
-RARELY int list_still(int i, int j, double h, const Contact **list) {
+/* If two of a crowd have hardly moved since their places were looked up, list their contacts of the step before and by how
+   much the gaps have changed; return 0 if the places have to be looked up. */
+RARELY int list_still(int i, int j, double h, const Contact **list, double *changes) {
     const Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
     const Surface *s = W.surfaces + (j < 0 ? -1 - j : 0);
     int count = 0;
@@ -777,15 +779,15 @@ RARELY int list_still(int i, int j, double h, const Contact **list) {
         if (W.earlier[k].j == j) list[count++] = W.earlier + k;
     if (!count || list[0]->places != count || list[0]->two != (j >= 0 && b->mode == FREE)) return 0;
     for (int n = 0; n < count; n++)
-        if (isnan(gap_change_since(list[n]))) return 0;
+        if (isnan(changes[n] = gap_change_since(list[n]))) return 0;
     return count;
 }
 
-/* Fill in a contact from that of the step before, with its present gap. */
-RARELY void go_on_with(Contact *c, const Contact *last, double h) {
+/* Fill in a contact from that of the step before, whose gap has changed by `change` since its place was looked up. */
+RARELY void go_on_with(Contact *c, const Contact *last, double change, double h) {
     double u[3];
     *c = *last;
-    c->gap = c->looked[0] + gap_change_since(c);
+    c->gap = c->looked[0] + change;
     c->most = INFINITY;
     c->share = 1;
     c->gives = c->parts = c->clings = 0;

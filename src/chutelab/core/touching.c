@@ -88,15 +88,17 @@ static double closes(const Contact *c, double aim, double h) {
 }
 
 /* Add a contact if the two touch and approach slowly, up to `bound`. With corners it is that at `place`, or continues the
-   contact `still`. `least` is the smaller radius. Return 0 if there is no room. */
-static int add(int i, int j, double least, double bound, double h, const Touch *place, const Contact *still) {
+   contact `still`, whose gap has changed by `change` since it was looked up. `least` is the smaller radius. Return 0 if
+   there is no room. */
+static int add(int i, int j, double least, double bound, double h, const Touch *place, const Contact *still,
+               double change) {
     if (W.contact_count >= W.contact_room) return 0;
     Contact *c = W.contacts + W.contact_count;
     const Disk *d = W.disks + i;
     double u[3], later, haste = 0;
     if (j < 0 && !place && !still && face_at(surface_at(-1 - j, d->t), d->x, d->y) != W.surfaces + (-1 - j)) return 1;
     if (j < 0) haste = 2 * h * hastes(W.surfaces + (-1 - j), d);
-    if (still) go_on_with(c, still, h);
+    if (still) go_on_with(c, still, change, h);
     else if (place) describe_touch(c, i, j, place);
     else describe(c, i, j);
     if (place || still) haste += 2 * h * (whirl_of(d) + (j < 0 ? 0 : whirl_of(W.disks + j)));
@@ -242,18 +244,27 @@ static void carry_to_end(int i, int first, double h) {
 }
 
 /* The places at which a particle with corners touches something: looked up now, or those of the step before. */
-typedef struct { Touch now[MOST_TOUCHES]; const Contact *still[MOST_TOUCHES]; int count, are_still; } Places;
+typedef struct {
+    Touch now[MOST_TOUCHES];
+    const Contact *still[MOST_TOUCHES];
+    double changes[MOST_TOUCHES];
+    int count, are_still;
+} Places;
 
 /* Add a contact at each place. */
 static RARELY int add_places(int i, int j, double bound, double h, const Places *at) {
-    for (int n = 0; n < at->count; n++)
-        if (!add(i, j, inner_of(i, j), bound, h, at->are_still ? 0 : at->now + n, at->are_still ? at->still[n] : 0)) return 0;
+    double least = inner_of(i, j);
+    for (int n = 0; n < at->count; n++) {
+        int added = at->are_still ? add(i, j, least, bound, h, 0, at->still[n], at->changes[n])
+                                  : add(i, j, least, bound, h, at->now + n, 0, 0);
+        if (!added) return 0;
+    }
     return 1;
 }
 
 /* List the places for a step of length h; return how many. */
 static int list_places(int i, int j, double h, Places *at) {
-    at->count = at->are_still = list_still(i, j, h, at->still);
+    at->count = at->are_still = list_still(i, j, h, at->still, at->changes);
     if (!at->count) at->count = list_touches(i, j, W.t, TOUCH * inner_of(i, j), W.t + h, at->now);
     return at->count;
 }
@@ -291,7 +302,7 @@ int find_contacts(double h, int *woke) {
             *woke = 1;
         }
         if (a->mode != FREE && !cornered) { int k = i; i = j; j = k; }
-        if (cornered ? !add_places(i, j, bound, h, &places) : !add(i, j, least, bound, h, 0, 0)) return 0;
+        if (cornered ? !add_places(i, j, bound, h, &places) : !add(i, j, least, bound, h, 0, 0, 0)) return 0;
     }
     if (*woke) return 1;
     for (EACH_LIVE(i)) {
@@ -309,7 +320,7 @@ int find_contacts(double h, int *woke) {
             if (d->supports && W.stirs) most += 2 * h * hastes(surface_at(k, d->t), d);
             if (has_corners(d)) most = MAX(most, left_over(d, d->impacts, k, d->radius, 0));
             if (has_corners(d)) list_places(i, -1 - k, h, &places);
-            if (has_corners(d) ? !add_places(i, -1 - k, most, h, &places) : !add(i, -1 - k, d->radius, most, h, 0, 0)) return 0;
+            if (has_corners(d) ? !add_places(i, -1 - k, most, h, &places) : !add(i, -1 - k, d->radius, most, h, 0, 0, 0)) return 0;
         }
         if (W.contact_count > first && !has_corners(d)) carry_to_end(i, first, h);
         for (Contact *c = W.contacts + first; W.interact && c < W.contacts + W.contact_count; c++) {

@@ -187,7 +187,7 @@ def test_the_pressure_under_a_heap_follows_its_height():
     """A floor in tiles: together they bear the weight, each about what lies above it, φ ρ g h(x).
 
     Poured disks are no fluid: arches carry the weight of the middle to the flanks, so that the
-    pressure is largest beside the middle, not below the top. Three heaps are taken together.
+    pressure is largest beside the middle, not below the top. Six heaps are taken together.
     """
     edges = np.linspace(-0.2, 0.2, 11)
     tiles = [
@@ -195,7 +195,7 @@ def test_the_pressure_under_a_heap_follows_its_height():
         for n, (a, b) in enumerate(pairwise(edges.tolist()))
     ]
     borne, above = np.zeros((2, len(tiles)))
-    for seed in range(3, 6):
+    for seed in range(3, 9):
         run = chutelab.simulate(
             {"particle": {"radius": [0.004, 0.006], "density": 2500, "spin": True,
                           "rolling_friction": 0.3},

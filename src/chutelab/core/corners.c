@@ -516,17 +516,17 @@ static double least_gap(int i, int j, const Shape *a, const Shape *b, double t, 
 }
 
 /* The instant within (low, high] at which the gap of a candidate closes, from `above` 0 to `below`. False position with
-   the Illinois rule, which halves the value at an end that stays, then bisection, until the gap is as small as the rounding
-   of a place. */
-static double root_of(int i, int j, Touch *at, double low, double high, double above, double below) {
-    double near = TOUCH * inner_of(i, j), rounding = 0;
-    for (int n = 0, side = 0; n < TO_ROOT && below < -rounding; n++) {
+   the Illinois rule, which halves the value at an end that stays, then bisection, until at a speed of `most` the way from
+   end to end is as small as the rounding of a place. The gap itself doesn't tell: of a corner that comes down beside an
+   edge in line with its own it stays at 0, however deep the corner is. */
+static double root_of(int i, int j, Touch *at, double low, double high, double above, double below, double most) {
+    double near = TOUCH * inner_of(i, j), rounding = EPS * (fabs(W.disks[i].x) + fabs(W.disks[i].y));
+    for (int n = 0, side = 0; n < TO_ROOT && (high - low) * most > rounding; n++) {
         double middle = n < QUICK ? high + (high - low) * below / (above - below) : 0.5 * (low + high);
         if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
         if (!(middle > low && middle < high)) break;
         Shape a = shape_of(i, middle), b = shape_of(j, middle);
         double gap = gap_at(&a, &b, near, at);
-        rounding = EPS * (fabs(a.x) + fabs(a.y));
         if (gap > 0) {
             low = middle;
             above = gap;
@@ -623,7 +623,7 @@ double meet_corners(int i, int j, double from, double until, double most, double
                 && closes_faster(i, j, &a2, &b2, t, TOUCHING * small, soft))
                 first = MIN(first, rolls_at(i, j, last, t, soft));
             if (!(before > 0 && gap[c] <= 0)) continue;
-            double then = root_of(i, j, &now, last, t, before, gap[c]);
+            double then = root_of(i, j, &now, last, t, before, gap[c], most);
             if (then >= first) continue;
             Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
             if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;

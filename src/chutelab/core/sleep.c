@@ -206,10 +206,11 @@ static void given_by(const Contact *c, double *J) {
 
 static int holds(const Contact *c) { return c->impulse[0] != 0 || c->clings > 0; }
 
-/* Whether two sleep and wake only together: with cohesion, a disk and a particle with corners, and particles with corners
-   that are too few for a crowd. */
+/* Whether two sleep and wake only together: with cohesion, what has joints, a disk and a particle with corners, and
+   particles with corners that are too few for a crowd. */
 static int is_pair(const Contact *c) {
-    return c->clings > 0 || (c->cornered && c->j >= 0 && (!has_corners(W.disks + c->j) || are_few(W.contact_count)));
+    return c->clings > 0 || is_tied(c->i) || is_tied(c->j)
+        || (c->cornered && c->j >= 0 && (!has_corners(W.disks + c->j) || are_few(W.contact_count)));
 }
 
 /* See `Frozen.rise`. */

@@ -297,7 +297,8 @@ int find_contacts(double h, int *woke) {
         if (cornered) bound = MAX(bound, left_over(b, impacts, -1, least, 0));
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
             bound = MAX(bound, cornered ? (few ? 1 : LATEST) * W.soft : MAX(W.soft, W.skip * least));
-        if ((a->mode == ASLEEP || b->mode == ASLEEP) && ((cornered && (!both || few)) || stirs_sleeper(a, b))) {
+        int together = (cornered && (!both || few)) || is_tied(i) || is_tied(j);
+        if ((a->mode == ASLEEP || b->mode == ASLEEP) && (together || stirs_sleeper(a, b))) {
             wake(a->mode == ASLEEP ? i : j, W.t);
             *woke = 1;
         }

@@ -419,6 +419,7 @@ typedef struct {
     LightBody *light_bodies; /* (disks + 1 + movers) */
     Frozen *frozen;      /* (2 contacts) contacts of sleepers */
     int *frozen_links;   /* (4 contacts) row n has the ends 2 n and 2 n + 1: the next end of the same disk, or -1 */
+    int *borders;        /* (2 contacts) rows of `frozen` of which one is a sleeper and the other one is not */
     double *balance;     /* (disks, 4, 2) room for conjugate gradients */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */
@@ -472,6 +473,7 @@ typedef struct {
     /* [out] */
     int knot_count, event_count, total_count, contact_count, near_count, earlier_count, swing_count;
     int frozen_count;
+    int border_count;    /* ... or -1 if they have to be listed again */
     int roused;          /* whether rows of `frozen` may have become obsolete */
     int later_count;     /* pairs in `near` beyond `near_count`, added when a path changed within the step; -1: there is
                             no room for them */

@@ -713,6 +713,7 @@ static int begin_part(void) {
     if (W.low >= W.disk_count) return 0;
     W.high = W.interact ? W.disk_count : W.low + 1;
     W.contact_count = W.earlier_count = W.live_count = W.frozen_count = 0;
+    W.border_count = -1;
     W.t = W.disks[W.low].release;
     W.smallest = W.low;
     for (int i = W.low; i < W.high; i++) {

@@ -265,6 +265,8 @@ static void make_contact_room(int room) {
     RESERVE(W.links, 2.0 * room);
     RESERVE(W.frozen, 2.0 * room);
     RESERVE(W.frozen_links, 4.0 * room);
+    RESERVE(W.borders, 2.0 * room);
+    W.border_count = -1;
     RESERVE(W.rows, room + 3.0 * W.mover_count);
     RESERVE(W.levers, W.outline_count || W.mover_count ? room + 3.0 * W.mover_count : 0);
     W.four_room = W.interact ? room / 4 : 0;

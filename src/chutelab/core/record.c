@@ -211,6 +211,7 @@ void finish(int i, int reason) {
     }
     write_waiting(i);
     d->mode = GONE;
+    W.border_count = -1;
     d->reason = reason;
     d->due = INFINITY;
     d->changes++;

@@ -75,6 +75,15 @@ static int sleeper_of(const Frozen *f) {
     return sleeps(f->i) ? f->i : f->j;
 }
 
+/* List the rows between sleepers and what is awake, if particles have fallen asleep or woken since: they are few on a belt
+   on which thousands ride. */
+static void list_borders(void) {
+    if (W.border_count >= 0) return;
+    W.border_count = 0;
+    for (int n = 0; n < W.frozen_count; n++)
+        if (sleeper_of(W.frozen + n) >= 0) W.borders[W.border_count++] = n;
+}
+
 static void link_end(int end) {
     int i = end % 2 ? W.frozen[end / 2].j : W.frozen[end / 2].i;
     if (i < 0) return;
@@ -108,6 +117,7 @@ void wake(int i, double t) {
     W.disks[i].rouses = -1;
     W.disks[i].mode = FREE;
     W.roused = 1;
+    W.border_count = -1;
     for (int n = i; n >= 0; n = W.disks[n].rouses) {
         Disk *d = W.disks + n;
         d->supports = 0;
@@ -170,8 +180,9 @@ static int roused_by(const Frozen *f) {
 void rouse(void) {
     for (EACH_LIVE(i))
         if (sleeps(i) && W.disks[i].stirred) wake(i, W.t);
-    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
-        int i = roused_by(f);
+    list_borders();
+    for (int n = 0, count = W.border_count; n < count; n++) {
+        int i = roused_by(W.frozen + W.borders[n]);
         if (i >= 0) wake(i, W.t);
     }
 }
@@ -220,6 +231,7 @@ static double rise_of(const Contact *c) {
 }
 
 static Frozen *freeze(const Contact *c) {
+    W.border_count = -1;
     Frozen *f = W.frozen + W.frozen_count++;
     *f = (Frozen){.from = INFINITY, .told = W.t + 0.5 * W.length, .rise = rise_of(c), .i = c->i, .j = c->j, .first = c->i};
     spot_of(c, f->spot);
@@ -231,7 +243,8 @@ static Frozen *freeze(const Contact *c) {
 /* Note the forces of awake particles on sleepers in this step. */
 void note_frozen(void) {
     double middle = W.t + 0.5 * W.length, of_now = MIN(W.length * W.pace / LATELY, 1);
-    for (Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) f->felt[0] = f->felt[1] = 0;
+    list_borders();
+    for (int n = 0; n < 2 * W.border_count; n++) W.frozen[W.borders[n / 2]].felt[n % 2] = 0;
     for (int n = 0; n < W.contact_count; n++) {
         Contact *c = W.contacts + n;
         double J[2], past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0;
@@ -251,9 +264,10 @@ void note_frozen(void) {
         for (int k = 0; k < 2; k++) f->felt[k] = sign * J[k] / (past + 0.5 * W.length);
         tell_frozen(f, c->j, (double[]){sign * J[0], sign * J[1]}, middle);
     }
-    for (Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
+    list_borders();
+    for (int k = 0; k < W.border_count; k++) {
+        Frozen *f = W.frozen + W.borders[k];
         int i = sleeper_of(f);
-        if (i < 0) continue;
         for (int n = 0; n < 2; n++) f->now[n] += of_now * (f->felt[n] - f->now[n]);
         if (f->felt[0] != 0 || f->felt[1] != 0) continue;
         tell_frozen(f, i, (double[]){0, 0}, middle);
@@ -283,6 +297,7 @@ static void forget_frozen(void) {
     for (int n = 0; n < W.contact_count; n++) W.contacts[n].frozen = 0;
     for (int i = W.low; i < W.high; i++) W.disks[i].frozen = -1;
     W.frozen_count = left;
+    W.border_count = -1;
     W.roused = 0;
     for (int end = 0; end < 2 * left; end++) link_end(end);
 }
@@ -304,7 +319,9 @@ static void keep_up(int *up) {
         const Disk *d = W.disks + W.near[n];
         if (d->mode == FREE && !d->supports && d->rest >= d->waits) up[W.near[n ^ 1]] = 1;
     }
-    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
+    list_borders();
+    for (int n = 0; n < W.border_count; n++) {
+        const Frozen *f = W.frozen + W.borders[n];
         int i = roused_by(f);
         if (i >= 0) up[i == f->i ? f->j : f->i] = 1;
     }
@@ -376,6 +393,7 @@ void fall_asleep(void) {
         Disk *d = W.disks + i;
         if (up[i]) continue;
         d->mode = ASLEEP;
+        W.border_count = -1;
         d->vx -= 0.5 * W.gx * W.step;
         d->vy -= 0.5 * W.gy * W.step;
     }

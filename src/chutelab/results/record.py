@@ -39,9 +39,6 @@ ENGINES = ("exact", "contact", "pymunk")
 PARTICLES = "particles"
 """Name under which the losses of particle-particle contacts are booked."""
 
-QUANTILES = (0.02, 0.5, 0.98)
-"""Quantiles of a stream at one edge, in the middle and at the other edge."""
-
 
 class Kind(IntEnum):
     """What happened in an event."""
@@ -291,8 +288,7 @@ class Record(Shown):
         How well each of these steps was solved: the largest overlap, in radii, left beyond what was
         asked for. A solve ends when this is small, or after a number of sweeps.
     unit : float
-        Unit (J) in which the entries of a crowd were saved, if it comes from a file; 0: they have
-        all bits. The laws allow for what it rounds.
+        Unit (J) in which a crowd's entries were saved, 0 if they have all bits; laws allow for it.
     drives : ndarray, shape (len(surfaces),) or (0,)
         The part of the belt work (J) in `by_surface`, in the knots and in `totals` that is the work
         of a surface's drive, see docs/physics.md, "Moving surfaces". Empty if none moves.
@@ -467,18 +463,15 @@ class Record(Shown):
 
     def which(self, *kinds: Kind | str, surface: str | None = None) -> Ints:
         """Return the indices of events, see `select`."""
-        kinds = tuple(kind_of(kind) for kind in kinds)
         if surface is not None and surface not in self.surfaces:
             there = f"the scene has {', '.join(self.surfaces)}"
             raise InputError(did_you_mean(surface, self.surfaces, there), "surface", surface)
         own, place = self._labels
-        keep = np.ones(len(own), dtype=bool)
-        if kinds:
-            # Several times as fast as `np.isin` for few events, as those of one particle.
-            keep &= np.logical_or.reduce([own == kind for kind in kinds])
+        # Several times as fast as `np.isin` for few events, as those of one particle.
+        keep: Bools = np.logical_or.reduce([own == kind for kind in map(kind_of, kinds or Kind)])
         if surface is not None:
             keep &= place == self.surface_index(surface)
-        return keep.nonzero()[0]
+        return np.flatnonzero(keep)
 
     def select(self, *kinds: Kind | str, surface: str | None = None) -> NDArray[Any]:
         """Return events, sorted by time.
@@ -583,10 +576,7 @@ Result = TypeVar("Result")
 def kept(
     reader: Callable[Concatenate[Record, Args], Result],
 ) -> Callable[Concatenate[Record, Args], Result]:
-    """Cache a reader's result in its record, for each set of further arguments.
-
-    Arrays become read-only.
-    """
+    """Cache a reader's result in its record, for each further arguments; arrays are read-only."""
     form = signature(reader)
     name, usual = (reader.__module__, reader.__name__), [*form.parameters.values()][1:]
     defaults = [one.default for one in usual]

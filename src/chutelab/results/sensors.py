@@ -15,11 +15,14 @@ from math import hypot, nan
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.results.record import QUANTILES, Record, hermite, kept
+from chutelab.results.record import Record, hermite, kept
 from chutelab.scene import Scene
 from chutelab.util.arrays import Floats, Ints
 from chutelab.util.errors import InputError
 from chutelab.util.tables import Sheet, number
+
+QUANTILES = (0.02, 0.5, 0.98)
+"""Quantiles of a stream at one edge, in the middle and at the other edge."""
 
 PASSAGE = np.dtype(
     [("t", "f8"), ("particle", "i4"), ("way", "i1"), ("along", "f8"), ("position", "f8", 2),

@@ -17,7 +17,7 @@ import numpy as np
 
 from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
-from chutelab.results.record import QUANTILES
+from chutelab.results.sensors import QUANTILES
 from chutelab.scene import AnyScene, Scene, from_dict, load, to_dict
 from chutelab.theory.discharge import LEFT_OUT, METHODS, Discharge, DischargeError, discharge
 from chutelab.util.arrays import Floats, Progress

@@ -36,7 +36,7 @@ from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import each
 from chutelab.results.quantities import prediction as predicted
-from chutelab.results.record import QUANTILES
+from chutelab.results.sensors import QUANTILES
 from chutelab.results.stream import envelopes, flows
 from chutelab.results.summary import layers
 from chutelab.scene import Scene

@@ -598,3 +598,18 @@ def test_a_rope_bridge_hangs_between_two_fixed_points(slack):
     assert np.hypot(*np.diff(rope, axis=1).T).max() < length + 4.0 * 1.23e-6
     sag = (3.0 * slack / 8.0) ** 0.5
     assert 0.5 * sag < -rope[..., 1].min() < 2.0 * sag
+
+
+def test_what_is_released_beside_a_pendulum_is_in_the_sums_at_once():
+    """K + U stays what it was at the releases, but for 1e-10 J by cubics between two steps."""
+    lying = {"velocity": [0.0, 0.0], "interact": True}
+    tables = scene(0.1, at=(-0.35, 0.31), rod=[{"from": [-0.05, 0.31], "particle": 0}])
+    tables["surface"] = [{"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0]}]
+    tables["stream"] = [{**tables["stream"], "interact": True}] + [
+        {"at": [x, 0.01], **lying} for x in (0.0, 0.1, 0.2)
+    ]
+    recording = simulate(tables)
+    found = recording.energy_at(np.linspace(0.0, 0.01, 41))
+    total = found["kinetic"] + found["potential"]
+    assert total == pytest.approx(0.1 * G * (0.31 + 3 * 0.01), abs=1e-9)
+    assert np.abs(found["residual"]).max() < 1e-12

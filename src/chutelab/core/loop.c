@@ -596,8 +596,10 @@ static int go_through(void) {
         Disk *d = W.disks + i;
         double t = d->due;
         int j = d->partner;
-        /* The step was cut short. */
-        if (t > W.step_end || (t == W.step_end && !(d->mode == WAITING && (is_tied(i) || has_corners(d))))) return DONE;
+        /* The step was cut short. What has joints or corners is released in a step of length 0, and with it all that is
+           released then: totals are noted before and after. */
+        int in_step = d->mode == WAITING && (is_tied(i) || has_corners(d) || W.step_end <= W.t);
+        if (t > W.step_end || (t == W.step_end && !in_step)) return DONE;
         if (W.knot_count + KNOTS_EACH * count + ride_knots(d) > W.knot_room) return FULL_KNOTS;
         if (W.event_count + SHOCKS * W.contact_count + 64 > W.event_room)
             return FULL_EVENTS;

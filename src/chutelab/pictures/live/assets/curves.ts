@@ -71,7 +71,7 @@ class CurvesPanel {
     this.board = html("div", {
       class: "curves", role: "slider", tabindex: "0", "aria-label": words.say("curves-slider"),
     }, ...DIAGRAMS.flatMap((_, n) => [this.legends[n], this.charts[n].root]));
-    this.which = html("input", { type: "number", min: "1", value: "1", id: "particle" });
+    this.which = html("input", { type: "number", min: "0", value: "0", id: "particle" });
     this.choice = html("label", { class: "field" }, words.say("particle"), this.which);
     this.table = html("table");
     this.values = html("details", { class: "values" },
@@ -98,7 +98,7 @@ class CurvesPanel {
 
   get index() {
     const many = this.lab.recording?.tracks.length ?? 1;
-    return Math.min(Math.max(Math.round(Number(this.which.value)) || 1, 1), many) - 1;
+    return Math.min(Math.max(Math.round(Number(this.which.value)) || 0, 0), many - 1);
   }
 
   listen() {
@@ -137,7 +137,7 @@ class CurvesPanel {
     if (!this.panel.open) return;
     const many = recording.tracks.length;
     this.choice.hidden = many < 2;
-    this.which.max = String(many);
+    this.which.max = String(many - 1);
     const samples = this.samples = samplesOf(recording, this.index);
     if (!samples.length) return;
     const times = samples.map(({ t }) => t);

@@ -207,13 +207,13 @@ class Tools {
       key: "tracer", value: t, unit: "s", step: this.stage.strobeStep, low: begin, high: end,
     }];
     if (many > 1) {
-      axes.push({ key: "particle", value: this.traced.index + 1, unit: "", step: 1, low: 1, high: many });
+      axes.push({ key: "particle", value: this.traced.index, unit: "", step: 1, low: 0, high: many - 1 });
     }
     return {
       id: "tracer", surface: "tracer", what: "point", shape: "point", x: state.x, y: state.y, axes,
       drag: (x, y) => this.nearest(x, y) ?? axes.map(({ value }) => value),
-      change: ([when, which = 1]) => {
-        const index = Math.min(many, Math.max(1, which)) - 1, its = recording.tracks[index];
+      change: ([when, which = 0]) => {
+        const index = Math.min(many - 1, Math.max(0, which)), its = recording.tracks[index];
         this.traced = { t: Math.min(its.end, Math.max(its.begin, when)), index };
         this.refresh();
       },
@@ -224,7 +224,7 @@ class Tools {
   /** Returns the nearest traceable point: of a drawn track, at a strobe dot if one is close; in a
    * crowd, whose tracks are not drawn, the present position of a particle.
    * @param y m
-   * @returns time, s, and number of the particle, from 1 */
+   * @returns time, s, and number of the particle, from 0 */
   nearest(x: number, y: number): [number, number] | null {
     const { stage, lab } = this, { recording } = lab;
     if (!recording) return null;
@@ -244,7 +244,7 @@ class Tools {
     const step = stage.strobeStep, dot = Math.round(t / step) * step;
     const state = crowd ? null : recording.tracks[index].state(dot);
     const close = state && Math.hypot(state.x - x, state.y - y) * stage.view.scale < MAGNET;
-    return [close ? dot : t, index + 1];
+    return [close ? dot : t, index];
   }
 
   /** Trace the point under the pointer. */
@@ -252,9 +252,9 @@ class Tools {
     const { stage, lab } = this, { view } = stage, [px, py] = this.pointer;
     const found = this.nearest(view.worldX(px), view.worldY(py));
     if (!found) return;
-    const [t, which] = found, state = lab.recording?.tracks[which - 1].state(t);
+    const [t, index] = found, state = lab.recording?.tracks[index].state(t);
     if (!state || Math.hypot(view.px(state.x) - px, view.py(state.y) - py) > REACH) return;
-    this.traced = { t, index: which - 1 };
+    this.traced = { t, index };
     this.refresh();
   }
 

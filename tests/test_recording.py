@@ -322,18 +322,20 @@ DRUM = {
     "run": {"until": 0.6},
 }  # fmt: skip
 CROWDS = {
-    "hopper": ("stream.count=80",),
-    "galton": ("stream.count=12",),
-    "stream": ("stream.count=30",),
-    "dominoes": ("run.until=0.25",),
-    "drum": (),
+    "hopper": ("hopper", "stream.count=80"),
+    "galton": ("galton", "stream.count=12"),
+    "stream": ("stream", "stream.count=30"),
+    # Of what rolls on the belt for seconds hardly a state is kept.
+    "rides": ("stream", "stream.count=100", "particle.spin=true"),
+    "dominoes": ("dominoes", "run.until=0.25"),
+    "drum": (DRUM,),
 }
 
 
 def crowded(name, **left_out):
     """Run a crowd by the contact engine; `left_out`: what tracks may leave out, 0 is nothing."""
-    told = scene.from_dict(DRUM) if name == "drum" else scene.load(name, CROWDS[name])
-    core = Core(machine.build(told))
+    of, *values = CROWDS[name]
+    core = Core(machine.build(scene.load(of, values) if values else scene.from_dict(of)))
     for field, value in left_out.items():
         setattr(core.world, field, value)
     return core.run()
@@ -361,7 +363,7 @@ def test_a_track_is_off_by_less_than_a_hop_and_the_run_stays_as_it_is(name):
         off = np.hypot(*np.moveaxis(run.at(times)[0] - places, -1, 0)) / hop
         return np.nanmax(off)
 
-    assert far(short) <= 4.0
+    assert far(short) <= 2.0
     assert np.nanmax(np.hypot(*np.moveaxis(short.at(times)[1] - paces, -1, 0))) <= 2.0 * g * dt
     assert far(crowded(name, hops=30.0)) > 4.0
 

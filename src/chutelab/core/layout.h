@@ -135,6 +135,7 @@ typedef struct {
     double load[3];       /* N; normal force in the last three steps, newest first */
     double load_t[3];
     int begun, waits;     /* whether it has a first knot; number of waiting states, see `World.waits` */
+    int noted, mask;      /* number of states since `from`; of them every (mask + 1)th waits, and the last two */
     int lasted;           /* steps in contact since the last impact, 0 in flight */
     int stays;            /* steps on one surface, with or without impacts */
     int ground;           /* owner of the surface of `stays`; a disk that leaves it may have struck another one last */

@@ -63,16 +63,28 @@ static void write_waiting(int i) {
     emit(last);
     memcpy(track->from, last, sizeof track->from);
     track->angles[0] = last->angle;
-    track->waits = 0;
+    track->waits = track->noted = track->mask = 0;
 }
 
-/* Drop every second waiting state except the last two. Since times between the others grow, `is_followed` allows smaller
-   errors of velocity. */
+/* Drop every second waiting state except the last two. */
 static void thin_out(Track *track, Knot *wait) {
     int left = 0;
     for (int n = 1; n < track->waits; n++)
         if (n % 2 || n >= track->waits - 2) wait[left++] = wait[n];
     track->waits = left;
+    track->mask = 2 * track->mask + 1;
+}
+
+/* Add a state to those that wait. Those before the last two are evenly spread from the last knot on: every state, or every
+   second, fourth and so on. Since times between them grow, `is_followed` allows smaller errors of velocity. */
+static void add_waiting(Track *track, Knot *wait, const Knot *now) {
+    if (track->waits > 1 && ((track->noted - 1) & track->mask)) {
+        wait[track->waits - 2] = wait[track->waits - 1];
+        track->waits--;
+    }
+    if (track->waits == WAITS) thin_out(track, wait);
+    wait[track->waits++] = *now;
+    track->noted++;
 }
 
 /* Note a state of a disk: t, x, y, vx, vy, spin. Of several states at the same instant the first and the last are kept. */
@@ -90,10 +102,11 @@ static void note(int i, const double *state, double angle, const double *entries
         return;
     }
     int count = track->waits, again = count > 1 ? wait[count - 2].t == now.t : track->from[0] == now.t;
-    if (count && again && wait[count - 1].t == now.t) track->waits--;
-    else if (count && wait[count - 1].t < now.t && !is_followed(track, wait, &now, W.disks + i)) write_waiting(i);
-    if (track->waits == WAITS) thin_out(track, wait);
-    wait[track->waits++] = now;
+    if (count && again && wait[count - 1].t == now.t) {
+        track->waits--;
+        track->noted--;
+    } else if (count && wait[count - 1].t < now.t && !is_followed(track, wait, &now, W.disks + i)) write_waiting(i);
+    add_waiting(track, wait, &now);
 }
 
 /* Write the present state of a disk as a knot. */

@@ -83,20 +83,23 @@ static void ease_friction(Contact *list, int count, double least, double by) {
    belt with practically unbounded friction.
 
    The impulses of the step before are taken as far as they lower the cost, see `lessen`: where a contact has opened, those of
-   its neighbours would throw disks out. Return whether the sweeps ended by themselves. */
+   its neighbours would throw disks out. But not in a crowd with corners: the share is that of the whole island, so for a blow
+   at its top a pile would forget what it bears, and creep until sweeps have found it again. Return whether the sweeps ended
+   by themselves. */
 int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                    double enough) {
     double first = INFINITY;
-    int driven = 0, pressing = 0, lessened = 0, ended, light = W.interact, fine = accurate < W.accurate;
+    int driven = 0, pressing = 0, lessened = 0, cornered = 0, ended, light = W.interact, fine = accurate < W.accurate;
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         driven |= drives(c);
         pressing |= presses(c);
+        cornered |= c->cornered;
         /* Plain sweeps show by their changes what has to stall. */
         if (drives(c) && c->friction > ROUGH && W.disks[c->i].inertia == 0) plain = sweeps;
     }
     set_rows(list, count);
-    lessen();
+    if (!cornered || count <= FEW_CONTACTS) lessen();
     for (int left = TRIES, more = rounds;;) {
         double change = light ? sweep_lightly(sweeps, plain, accurate) : INFINITY, worst;
         if (change == INFINITY) change = sweep_rows(sweeps, plain, accurate);

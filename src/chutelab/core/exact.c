@@ -61,8 +61,9 @@ static void write_event(int kind, int surface) {
                                          { A.vx, A.vy, spin }, 0.0, 0.0, E.lone, NONE, kind, surface };
 }
 
-/* Loads have been reported up to here; in flight there are none. */
+/* Loads, if they are asked for, have been reported up to here; in flight there are none. */
 static void tell_here(void) {
+    if (!(B.every > 0.0)) return;
     double now[] = { A.age, A.x, A.y, A.vx, A.vy, A.z };
     for (int n = 0; n < 6; n++) A.told[n] = now[n];
 }
@@ -70,24 +71,29 @@ static void tell_here(void) {
 /* Report the load by the particle on a surface since the last report: the surface gave the change of the velocity, and
    what gravity took. It is `depth` (m) below the centre. */
 static void bear_since(int surface, double nx, double ny, double depth) {
+    if (!(B.every > 0.0)) return;
     double span = A.age - A.told[0], mass = A.given->mass, from = A.given->release + A.told[0];
-    if (B.every > 0.0) {
-        Push p = { .owner = surface, .from = from, .to = from + span, .x = A.told[1] - depth * nx,
-                   .y = A.told[2] - depth * ny, .nx = nx, .ny = ny, .jx = mass * (A.vx - A.told[3]),
-                   .jy = mass * (A.vy - A.told[4] + A.given->gravity * span) };
-        if (span > 0.0) {
-            /* The parabola from there to the present place with the present velocity at its end. */
-            double rate = 1.0 / span;
-            p.ax = 2.0 * rate * (A.vx - rate * (A.x - A.told[1]));
-            p.ay = 2.0 * rate * (A.vy - rate * (A.y - A.told[2]));
-            p.vx = A.vx - p.ax * span, p.vy = A.vy - p.ay * span;
-        }
-        if (A.turns && A.given->rolling > 0.0)
-            p.couple = A.given->inertia * (A.z - A.told[5]) / A.given->radius
-                - A.given->radius * (p.jx * ny - p.jy * nx);
-        bear(&p);
+    Push p = { .owner = surface, .from = from, .to = from + span, .x = A.told[1] - depth * nx,
+               .y = A.told[2] - depth * ny, .nx = nx, .ny = ny, .jx = mass * (A.vx - A.told[3]),
+               .jy = mass * (A.vy - A.told[4] + A.given->gravity * span) };
+    if (span > 0.0) {
+        /* The parabola from there to the present place with the present velocity at its end. */
+        double rate = 1.0 / span;
+        p.ax = 2.0 * rate * (A.vx - rate * (A.x - A.told[1]));
+        p.ay = 2.0 * rate * (A.vy - rate * (A.y - A.told[2]));
+        p.vx = A.vx - p.ax * span, p.vy = A.vy - p.ay * span;
     }
+    if (A.turns && A.given->rolling > 0.0)
+        p.couple = A.given->inertia * (A.z - A.told[5]) / A.given->radius
+            - A.given->radius * (p.jx * ny - p.jy * nx);
+    bear(&p);
     tell_here();
+}
+
+/* The same of a particle that has gone round a circle: the normal is that in the middle. */
+static void bear_round(int surface, double x, double y, double rho, double depth) {
+    double mx = A.x + A.told[1] - 2.0 * x, my = A.y + A.told[2] - 2.0 * y, away = copysign(length_of(mx, my), rho);
+    bear_since(surface, mx / away, my / away, depth);
 }
 
 static void bear_at(const Touch *c) { bear_since(c->surface, c->nx, c->ny, A.given->radius); }
@@ -668,9 +674,7 @@ static void fly(void) {
         stop_now();
 }
 
-static void put_round(double rho, double phi, double pace, double x, double y) {
-    double up, across;
-    sin_cos(phi, &up, &across);
+static void put_round(double rho, double up, double across, double pace, double x, double y) {
     A.x = x + rho * up, A.y = y + rho * across;
     A.vx = pace * across, A.vy = -pace * up;
 }
@@ -699,14 +703,14 @@ static void carry_round(double start, double pace) {
         double begin = A.age, above = rho * across, way = end - start, parts = ceil(way / step_angle());
         for (int n = 1; n <= parts; n++) {
             double turn = way * (n / parts);
-            put_round(rho, start + turn, pace, 0.0, 0.0);
+            sin_cos(start + turn, &up, &across);
+            put_round(rho, up, across, pace, 0.0, 0.0);
             A.age = begin + rho * turn / pace;
             /* The belt lifts the particle, or lets it down: F v = -m g v sin phi, since the last knot. */
             double height = rho * cosine(start + turn);
             book(pulley->surface, -A.given->mass * g * (above - height), 0.0, 0.0);
             above = height;
-            double mx = A.x + A.told[1], my = A.y + A.told[2], away = length_of(mx, my);
-            bear_since(pulley->surface, mx / away, my / away, rho - pulley->bend);
+            bear_round(pulley->surface, 0.0, 0.0, rho, rho - pulley->bend);
             write_knot();
         }
         if (cut) A.age = stop;
@@ -774,19 +778,17 @@ static void ride(void) {
         const Ridden *r = n < count ? knots + n : &end;
         double work = mass * (r->work * c.belt + (rolls ? r->twist * turn : 0.0)), heat = mass * r->heat;
         A.age = age + r->dt;
-        put_round(rho, r->phi, r->w, center_x, center_y);
+        put_round(rho, r->up, r->across, r->w, center_x, center_y);
         A.z = r->z;
         if (n == count) book(c.surface, work, 0.0, heat);
         else A.entries[0] = before[0] + work, A.entries[2] = before[2] + heat;
-        double mx = A.x + A.told[1] - 2.0 * center_x, my = A.y + A.told[2] - 2.0 * center_y;
-        double away = copysign(length_of(mx, my), rho);
-        bear_since(c.surface, mx / away, my / away, A.given->radius);
+        bear_round(c.surface, center_x, center_y, rho, A.given->radius);
         write_knot();
         for (int k = 0; k < 3 && n < count; k++) A.entries[k] = before[k];
     }
     A.angle = end.phi;
     const Bound *there = A.bounds + (end.outcome == HIGH);
-    double tends = sine(end.phi);
+    double tends = end.up;
     switch (end.outcome) {
     case NOTHING:
         if (A.age >= A.given->stop) end_track(TIME_IS_OVER);
@@ -800,11 +802,11 @@ static void ride(void) {
         part_from(c.surface);
         let_go(circle, 0, 3, NONE);
         break;
-    case ROLL: A.roll = -sign_of(sine(end.phi)); break;
+    case ROLL: A.roll = -sign_of(end.up); break;
     case HALT: end_roll(); break;
     case ONSET:
         if (rolls) {
-            double load = A.given->gravity * cosine(end.phi) - end.w * end.w / rho;
+            double load = A.given->gravity * end.across - end.w * end.w / rho;
             tends = A.given->gravity * tends - A.lever * A.roll * A.given->rolling * load;
         }
         A.slip = sign_of(tends);
@@ -918,7 +920,8 @@ static void proceed(void) {
 
 /* Reserve the arrays that the host fills in, and those of the results. */
 EXPORT int lay_out_exact(void) {
-    double members = E.each ? E.lone_count / E.each : 1, many = MIN(20.0 * E.lone_count, KEPT);
+    /* Room that is not used costs nothing, and a lack of it a copy of all knots. */
+    double members = E.each ? E.lone_count / E.each : 1, many = MIN(30.0 * E.lone_count, KEPT);
     RESERVE(E.segments, members * E.segment_count);
     RESERVE(E.arcs, members * E.arc_count);
     RESERVE(E.wheels, members * E.wheel_count);

@@ -199,12 +199,16 @@ typedef struct {
     double rolling, roll, turn; /* rolling friction; its sign; r ω of the surface */
 } Circle;
 
-/* The state at the end of a step, or at a knot within it, with time, work and heat since its beginning. */
-typedef struct { double dt, phi, w, z, work, heat, twist; int outcome; } Ridden;
+/* The state at the end of a step, or at a knot within it, with time, work and heat since its beginning, and sin and cos
+   of the angle. */
+typedef struct { double dt, phi, up, across, w, z, work, heat, twist; int outcome; } Ridden;
 
 #define MOST_KNOTS 32
 
 int advance_ride(const Circle *c, double longest, Ridden *end, Ridden *knots);
 void find_bounds(int circle, int side, double phi, int epoch, Bound *found);
+
+/* exact_pass.c */
+int pass_round(const Circle *c, double longest, Ridden *end, Ridden *knots);
 
 #endif

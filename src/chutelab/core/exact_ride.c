@@ -194,12 +194,16 @@ static Ridden state_at(double t) {
         spent = spent * t + (Two){ work[n], heat[n] };
         turned = turned * t + (Two){ z[n], twist[n] };
     }
-    return (Ridden){ t, place[0], place[1], turned[0], spent[0], spent[1], turned[1], NOTHING };
+    Ridden found = { .dt = t, .phi = place[0], .w = place[1], .z = turned[0], .work = spent[0], .heat = spent[1],
+                     .twist = turned[1], .outcome = NOTHING };
+    sin_cos(found.phi, &found.up, &found.across);
+    return found;
 }
 
 /* Move on by one step, or to the first event within it; return the number of knots before its end. N must be positive. */
 int advance_ride(const Circle *c, double longest, Ridden *end, Ridden *knots) {
-    int parts, outcome = NOTHING, count = 0;
+    int parts, outcome = NOTHING, count = pass_round(c, longest, end, knots);
+    if (count) return count - 1;
     expand(c);
     find_gauges(c);
     double dt = step_of(c, longest, &parts);
@@ -233,7 +237,9 @@ int advance_ride(const Circle *c, double longest, Ridden *end, Ridden *knots) {
     }
     *end = state_at(dt);
     end->outcome = outcome;
-    if (outcome == LOW) end->phi = c->low;
-    if (outcome == HIGH) end->phi = c->high;
+    if (outcome == LOW || outcome == HIGH) {
+        end->phi = outcome == LOW ? c->low : c->high;
+        sin_cos(end->phi, &end->up, &end->across);
+    }
     return count;
 }

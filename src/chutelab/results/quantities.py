@@ -33,7 +33,7 @@ from chutelab.scene.units import with_unit
 from chutelab.scene.variants import Family
 from chutelab.theory import Transfer, predict, unbounded
 from chutelab.theory.prediction import outside
-from chutelab.util.arrays import Bools, Floats, Numbers, put, sorted_by
+from chutelab.util.arrays import Bools, Floats, Numbers, begins, put, sorted_by
 from chutelab.util.tables import Sheet, Shown, number
 
 ALONG = 1e-14
@@ -322,14 +322,14 @@ def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
     events, each = recording.events, recording.count // len(holds)
     kinds = [int(kind) for kind in (Kind.SEPARATION, Kind.IMPACT, Kind.LANDING, *OTHER)]
     if each > 1:
-        events = events.take((events["particle"] % each == 0).nonzero()[0])
+        events = events.take((recording.labels[2] % each == 0).nonzero()[0])
     # Grip and slip on the belt and the pulley are in the equations.
     known = events["kind"] == Kind.STICK
     known &= events["surface"] == recording.surface_index("incoming")
     order = (np.isin(events["kind"], kinds) & ~known).nonzero()[0]
     own = events.take(order[sorted_by(events["particle"][order], recording.count)])
     own["particle"] //= each
-    place = np.arange(len(own)) - np.searchsorted(own["particle"], own["particle"])
+    place = np.arange(len(own)) - begins(own["particle"], len(holds))
     found = []
     for n in range(len(NEEDED)):
         at, one = place == n, never(len(holds))

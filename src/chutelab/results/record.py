@@ -457,16 +457,17 @@ class Record(Shown):
         return self.surfaces.index(name) if name in self.surfaces else -1
 
     @cached_property
-    def _labels(self) -> tuple[NDArray[np.int8], NDArray[np.int16]]:
-        """Kind and surface of each event: many are read for a few, and rows of events are long."""
-        return self.events["kind"].copy(), self.events["surface"].copy()
+    def labels(self) -> tuple[NDArray[np.int8], NDArray[np.int16], Ints]:
+        """Kind, surface and particle of each event: rows of events are long, and these short."""
+        kind, surface, particle = (self.events[name] for name in ("kind", "surface", "particle"))
+        return kind.copy(), surface.copy(), particle.copy()
 
     def which(self, *kinds: Kind | str, surface: str | None = None) -> Ints:
         """Return the indices of events, see `select`."""
         if surface is not None and surface not in self.surfaces:
             there = f"the scene has {', '.join(self.surfaces)}"
             raise InputError(did_you_mean(surface, self.surfaces, there), "surface", surface)
-        own, place = self._labels
+        own, place, _ = self.labels
         # Several times as fast as `np.isin` for few events, as those of one particle.
         keep: Bools = np.logical_or.reduce([own == kind for kind in map(kind_of, kinds or Kind)])
         if surface is not None:

@@ -44,6 +44,17 @@ def sorted_by(numbers: Ints, most: int) -> Ints:
     return np.argsort(numbers.astype(np.min_scalar_type(most)), kind="stable")
 
 
+def begins(numbers: Ints, most: int) -> Ints:
+    """Return for each of some numbers from 0 to `most`, in order, where those equal to it begin.
+
+    >>> begins(np.array([0, 0, 2, 2, 2]), 3)
+    array([0, 0, 2, 2, 2])
+    """
+    sizes = np.bincount(numbers, minlength=most)
+    found: Ints = (sizes.cumsum() - sizes)[numbers]
+    return found
+
+
 RADIANS = np.pi / 180.0
 """Of one degree."""
 

@@ -27,7 +27,7 @@ from chutelab.results.quantities import measured
 from chutelab.results.stream import told_fates
 from chutelab.scene.quantities import COLUMNS, FORMER, HEAT, PAID, REGISTRY, lookup
 from chutelab.scene.variants import Quantity
-from chutelab.util.arrays import Floats, sorted_by
+from chutelab.util.arrays import Floats, begins, sorted_by
 from chutelab.util.errors import InputError, library
 from chutelab.util.files import csv_columns, csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, many, number
@@ -175,9 +175,6 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
 LONGEST: Final = 6
 """Most surfaces that are named; longer sequences with the same beginning have the same name."""
 
-FIELDS: Final = "particle", "surface", "kind"
-"""Fields of an event that define a sequence of surfaces."""
-
 NOTHING: Final = "nothing"
 """Word for a particle that meets no surface."""
 
@@ -195,15 +192,14 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
     """
     # Particles, and the surfaces that each meets up to its landing.
     order = recording.which(Kind.IMPACT, Kind.LANDING, Kind.SETTLE)
-    # Only needed columns are taken; whole rows are ten times as large.
-    particle, surface, lands = (recording.events[name][order].astype(np.int64) for name in FIELDS)
-    order = sorted_by(particle, recording.count)
-    particle, surface, lands = particle[order], surface[order], lands[order] == Kind.LANDING
+    kind, surface, particle = recording.labels
+    order = order[sorted_by(particle[order], recording.count)]
+    particle, surface, lands = particle[order], surface[order], kind[order] == Kind.LANDING
     landings = np.cumsum(lands) - lands
-    kept = landings == landings[np.searchsorted(particle, particle)]
+    kept = landings == landings[begins(particle, recording.count)]
     kept[1:] &= (particle[1:] != particle[:-1]) | (surface[1:] != surface[:-1])
     particle, surface = particle[kept], surface[kept]
-    place = np.arange(len(particle)) - np.searchsorted(particle, particle)
+    place = np.arange(len(particle)) - begins(particle, recording.count)
     ways = np.full((recording.count, LONGEST + 1), -1)
     near = place <= LONGEST
     ways[particle[near], place[near]] = surface[near]
@@ -214,6 +210,8 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
             found, taken = np.unique(taken, return_inverse=True)
             kinds = len(found)
         taken, kinds = taken * some + met + 1, kinds * some
+    # Short numbers are sorted several times as fast.
+    taken = taken.astype(np.min_scalar_type(kinds))
     _, example, taken = np.unique(taken, return_index=True, return_inverse=True)
     names = np.empty(len(example), dtype=object)
     for n, way in enumerate(ways[example].tolist()):

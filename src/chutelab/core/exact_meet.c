@@ -15,6 +15,10 @@
 #define FROM_CURVE 2
 /* Greatest number of refinements of a root: Newton's method takes about 8, bisection alone this many. */
 #define REFINEMENTS 120
+/* A step of Newton's method is the last if it is at most SETTLED of t, and QUADRATIC of the step before: as errors fall with
+   their squares, QUADRATIC^2 of the step is left. */
+#define SETTLED 1e-8
+#define QUADRATIC 1e-4
 /* Halvings of an interval after which a polynomial with two roots in it is practically a parabola, but still larger than
    its rounding; Newton steps to where that turns back; and greatest number of descents of a polynomial of degree 4: it
    has two, and by rounding one or two more. */
@@ -49,17 +53,19 @@ double polynomial(const double *c, int count, double t) {
 /* The root of a polynomial of degree 4 that is positive at `low`, negative at `high` (within rounding) and crosses zero
    once between: Newton's method inside a shrinking bracket, with bisection where a step would leave it. */
 static double crossing(const double *c, double low, double high) {
-    if (!(polynomial(c, 5, low) > 0.0)) return low;
-    if (!(polynomial(c, 5, high) < 0.0)) return high;
-    double t = 0.5 * (low + high);
+    double above = polynomial(c, 5, low), below = polynomial(c, 5, high), step = INFINITY;
+    if (!(above > 0.0)) return low;
+    if (!(below < 0.0)) return high;
+    double t = low + (high - low) * (above / (above - below));
     for (int n = 0; n < REFINEMENTS; n++) {
-        double value = 0.0, rate = 0.0, old = t;
+        double value = 0.0, rate = 0.0, old = t, before = step;
         for (int k = 4; k >= 0; k--) rate = rate * t + value, value = value * t + c[k];
         if (value >= 0.0) low = t;
         else high = t;
         double newton = t - value / rate;
         t = newton > low && newton < high ? newton : value == 0.0 ? t : 0.5 * (low + high);
-        if (fabs(t - old) <= 0.5 * ULP * fabs(old)) break;
+        step = fabs(t - old);
+        if (step <= 0.5 * ULP * fabs(old) || (step <= SETTLED * fabs(old) && step <= QUADRATIC * before)) break;
     }
     return t;
 }

@@ -280,12 +280,13 @@ static int set_fours(int rows, int cornered, int *rolls) {
    returned then. Else the rows have the new impulses; the caller updates the velocities by `scale`. */
 double sweep_fours(int rows, int all_bodies, int cornered, int sweeps, int plain, double accurate, double most) {
     int rolls = 0;
-    if (!set_fours(rows, cornered, &rolls)) return INFINITY;
     bodies = all_bodies;
     for (int n = 0; n < bodies; n++) {
-        const SolverBody *b = W.solver_bodies + n;
+        SolverBody *b = W.solver_bodies + n;
+        b->used = 0;
         W.light_bodies[n] = (LightBody){.x = (float)b->x, .y = (float)b->y, .rim = (float)b->rim};
     }
+    if (!set_fours(rows, cornered, &rolls)) return INFINITY;
     double worst;
     if (cornered) worst = rolls ? sweep(sweeps, plain, accurate, most, 1, 1) : sweep(sweeps, plain, accurate, most, 0, 1);
     else worst = rolls ? sweep(sweeps, plain, accurate, most, 1, 0) : sweep(sweeps, plain, accurate, most, 0, 0);

@@ -102,10 +102,12 @@ int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, 
     if (!cornered || count <= FEW_CONTACTS) lessen();
     for (int left = TRIES, more = rounds;;) {
         double change = light ? sweep_lightly(sweeps, plain, accurate) : INFINITY, worst;
+        light &= cornered && count > FEW_CONTACTS && change < INFINITY;
         if (change == INFINITY) change = sweep_rows(sweeps, plain, accurate);
-        light = 0;
         worst = change;
         ended = change <= accurate;
+        /* What sweeps by fours have brought to their end needs finer ones. */
+        light &= !ended;
         if (!ended) keep_bounds();
         if (!ended || W.interact) lessened = lessen();
         if (left == 0) break;

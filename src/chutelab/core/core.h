@@ -413,7 +413,7 @@ void shock(int i, int j, double t);
 int is_alone(const Contact *c, const double *before);
 void hold(Disk *d, int k);
 double soft_approach(const Disk *d, double radius);
-double left_over(const Disk *d, int impacts, int surface, double radius, int sunk);
+double left_over(const Disk *d, int impacts, int surface, double radius, int sunk, double t);
 void lie_down(int i);
 void was_moved(int i);
 

@@ -72,7 +72,7 @@ double soft_approach(const Disk *d, double radius) {
 /* Approach up to which a contact is left to the next step, m/s. A disk that lies on a surface comes back to it at the end
    of each step, as fast as gravity makes it in a step, and inside an arc as fast as the curved path does. Of an approach
    with a deep overlap hardly anything is left. */
-double left_over(const Disk *d, int impacts, int surface, double radius, int sunk) {
+double left_over(const Disk *d, int impacts, int surface, double radius, int sunk, double t) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
     if (has_corners(d)) {
         /* A corner in contact comes back as fast as gravity and the rotation make it. */
@@ -87,7 +87,9 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     for (int n = 0; n < d->held_count && surface >= 0 && !has_corners(d); n++) {
         if (sunk || !is_one(d, d->held[n], surface)) continue;
         double haste = hastes(surface_at(surface, d->t), d);
-        least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface) + haste) * W.step);
+        double press = W.g + pressed_inside(d, surface) + haste, back = 1.000001 * press * W.step, left = W.step_end - t;
+        if (W.interact && left > 0) back = MIN(back, LATE * radius / left - 0.5 * press * left);
+        least = MAX(least, back);
     }
     /* Surfaces do not give way: with them the bound grows only if jams do not help. */
     int many = sunk ? STUCK : surface >= 0 ? 2 * JAM : MANY;
@@ -107,13 +109,13 @@ static double left_late(const Disk *a, const Disk *b, double overlap, double mos
 /* Approach up to which two disks are left to the next step at t, where their gap is negative if they overlap, m/s. */
 static double left_between(const Disk *a, const Disk *b, double radius, double gap, double t) {
     int sunk = gap < -SUNK * radius;
-    double least = left_over(a, MAX(a->impacts, b->impacts), -1, radius, sunk);
+    double least = left_over(a, MAX(a->impacts, b->impacts), -1, radius, sunk, t);
     return sunk ? least : MAX(least, left_late(a, b, MAX(LATE * radius + MIN(gap, 0), MORE * radius), W.soft, t));
 }
 
 /* The same for two particles of which one has corners. */
 static double left_by_corners(const Disk *a, const Disk *b, int impacts, double t) {
-    double small = MIN(a->inner, b->inner), least = MAX(left_over(a, impacts, -1, small, 0), left_over(b, impacts, -1, small, 0));
+    double small = MIN(a->inner, b->inner), least = MAX(left_over(a, impacts, -1, small, 0, t), left_over(b, impacts, -1, small, 0, t));
     if (are_few(W.contact_count)) return least;
     return MAX(least, left_late(a, b, LATE_CORNERS * small, LATEST * W.soft, t));
 }
@@ -126,7 +128,7 @@ static RARELY double meet_cornered(int i, int j, double from) {
     double most = fastest_of(first, other, from, W.step_end - from);
     /* Any approach of a corner up to this is left to the next step. */
     if (most == INFINITY || most <= W.g * W.step) return INFINITY;
-    double soft = other < 0 ? left_over(d, impacts, -1 - other, d->inner, 0) : left_by_corners(d, o, impacts, from);
+    double soft = other < 0 ? left_over(d, impacts, -1 - other, d->inner, 0, from) : left_by_corners(d, o, impacts, from);
     return meet_corners(first, other, from, W.step_end, most, soft);
 }
 
@@ -178,7 +180,7 @@ static void foresee_surfaces(int i, double *due, int *partner) {
         }
         const Surface *s = surface_at(k, d->t);
         if (s->mover >= 0 && !stirs(s) && d->mode == ASLEEP && d->ux == 0 && d->uy == 0) continue;
-        if (!has_corners(d) && stirs(s) && closing(s, d, W.step_end - d->t) <= left_over(d, d->impacts, k, d->radius, 0)) continue;
+        if (!has_corners(d) && stirs(s) && closing(s, d, W.step_end - d->t) <= left_over(d, d->impacts, k, d->radius, 0, d->t)) continue;
         double t = has_corners(d) ? meet_cornered(i, -1 - k, MAX(W.now, d->t + wait)) : wait > 0 ? meet_after_wait(s, d, wait, &approach)
             : d->t + meet_surface(s, d, W.step_end - d->t, &approach);
         /* A disk that moves round an end within the step arrives at the side that lets it pass. */
@@ -188,7 +190,7 @@ static void foresee_surfaces(int i, double *due, int *partner) {
             chain_gap(s, d, then.x, then.y, t, &side);
             if (side < 0) continue;
         }
-        if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius, 0)) {
+        if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius, 0, t)) {
             *due = MAX(t, W.now);
             *partner = -1 - k;
         }
@@ -429,7 +431,7 @@ static void jam(Contact *struck, double t) {
         double u[3], r = c->j >= 0 ? MIN(a->radius, W.disks[c->j].radius) : a->radius;
         int sunk = !c->cornered && c->gap <= -SUNK * r;
         relative(c, 0, u);
-        c->need = -u[0] <= left_over(a, 0, -1 - c->j, r, sunk) ? MIN(-u[0], 0) : -u[0];
+        c->need = -u[0] <= left_over(a, 0, -1 - c->j, r, sunk, a->t) ? MIN(-u[0], 0) : -u[0];
         if (sunk && c->j < 0) {
             double press = press_on(a, W.surfaces + (-1 - c->j), c->nx, c->ny);
             c->need = -u[0] + 0.5 * MAX(press, 0) * (W.step_end - t);
@@ -691,7 +693,7 @@ static int struck_too(const Contact *c, double t, int *j) {
             soft = left_by_corners(a, b, MAX(a->impacts, b->impacts), t);
             double x = a->vx - b->vx, y = a->vy - b->vy, turns = fabs(a->spin) * a->radius + fabs(b->spin) * b->radius;
             if (turns < soft && x * x + y * y <= square(soft - turns)) return 0;
-        } else soft = left_over(a, a->impacts, -1 - c->j, a->inner, 0);
+        } else soft = left_over(a, a->impacts, -1 - c->j, a->inner, 0, t);
         /* At the places in contact it must approach faster than that; what has rotated or closed since is foreseen. */
         int moves = c->j < 0 && stirs(W.surfaces + (-1 - c->j));
         for (const Contact *o = c; o >= W.contacts && o->i == c->i && o->j == c->j && !moves; o--) {
@@ -712,7 +714,7 @@ static int struck_too(const Contact *c, double t, int *j) {
         carried(s, a->x, a->y, v);
         *j = -1 - k;
         return gap < TOUCH * a->radius
-            && -((a->vx - v[0]) * nx + (a->vy - v[1]) * ny) > left_over(a, a->impacts, k, a->radius, 0);
+            && -((a->vx - v[0]) * nx + (a->vy - v[1]) * ny) > left_over(a, a->impacts, k, a->radius, 0, t);
     }
     if (b->mode != FREE) return 0;
     advance(b, t);

@@ -13,6 +13,13 @@ World W;
 #define ARC_ANGLE 0.024
 /* Greatest number of tries to find the time at which an impact cuts a step with halved contacts. */
 #define CUTS 5
+/* A crowd of which more than the share MANY_DEEP of the contacts are deeper than DEEP radii as a step begins takes shorter
+   steps, down to LEAST_EASE of what hops allow: after each such step by SHORTEN, after others longer by LENGTHEN. */
+#define DEEP 4.5e-3
+#define MANY_DEEP 0.01
+#define LEAST_EASE 0.5
+#define SHORTEN 0.98
+#define LENGTHEN 1.01
 /* Greatest number of knots that an impact writes for a disk. */
 #define KNOTS_EACH 6
 
@@ -420,6 +427,18 @@ static void note_totals(void) {
     W.totals[W.total_count++] = all;
 }
 
+/* Set which share of the longest step the next one of a crowd takes, by the overlaps that the last one has left: of pairs
+   and of contacts with surfaces. */
+static void judge_overlaps(void) {
+    int deep[2] = {0, 0}, all[2] = {0, 0};
+    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
+        deep[c->j < 0] += c->gap < -DEEP * inner_of(c->i, c->j);
+        all[c->j < 0]++;
+    }
+    W.ease *= deep[0] > MANY_DEEP * all[0] || deep[1] > MANY_DEEP * all[1] ? SHORTEN : LENGTHEN;
+    W.ease = MIN(MAX(W.ease, LEAST_EASE), 1);
+}
+
 /* Begin a step: paths of riders and sleepers, pairs that may meet, lasting contacts and their solve. If an array is too
    small, return a `Full` status before anything has changed; the step can then be begun again. */
 static int begin_step(void) {
@@ -427,13 +446,13 @@ static int begin_step(void) {
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
     if (W.total_count >= W.total_room) return FULL_TOTALS;
     if (W.hinges && W.swing_count + 4 * W.mover_count > W.swing_room) return FULL_SWINGS;
-    double next = set_gates(W.t), h = W.dt, stride = 0;
-    h = MIN(h, hop_time(W.disks + W.smallest, W.g + W.haste));
+    double next = set_gates(W.t), stride = 0, h = hop_time(W.disks + W.smallest, W.g + W.haste);
     for (int i = W.low; i < W.high && W.outline_count; i++) {
         const Disk *d = W.disks + i;
         double press = W.g + W.haste + (has_corners(d) && d->mode == FREE ? whirl_of(d) : 0);
         h = MIN(h, hop_time(d, press));
     }
+    h = MIN(W.ease * h, W.dt);
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     if (W.hinges) h = hinge_step(h);
     W.usual = h;
@@ -511,6 +530,7 @@ static int begin_step(void) {
         }
     } while (woke);
     W.length = h;
+    if (W.interact) judge_overlaps();
     if (W.pushes) kick_disks(h);
     if (W.hinges) begin_hinges(W.t, h);
     W.swings_too = 0;
@@ -733,6 +753,7 @@ static int begin_part(void) {
     }
     if (W.hinges) W.t = MIN(W.t, 0);
     W.looked = W.t;
+    W.ease = 1;
     W.room = INFINITY;
     for (int k = 0; k < W.surface_count; k++) {
         double room = W.surfaces[k].radius - W.disks[W.low].radius;

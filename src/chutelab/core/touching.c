@@ -293,8 +293,8 @@ int find_contacts(double h, int *woke) {
         if (cornered && !list_places(i, j, h, &places)) continue;
         /* Slow approaches that the step before has left become contacts here. */
         int impacts = MAX(a->impacts, b->impacts);
-        double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least, 0);
-        if (cornered) bound = MAX(bound, left_over(b, impacts, -1, least, 0));
+        double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least, 0, W.t);
+        if (cornered) bound = MAX(bound, left_over(b, impacts, -1, least, 0, W.t));
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
             bound = MAX(bound, cornered ? (few ? 1 : LATEST) * W.soft : MAX(W.soft, W.skip * least));
         int together = (cornered && (!both || few)) || is_tied(i) || is_tied(j);
@@ -310,7 +310,7 @@ int find_contacts(double h, int *woke) {
         Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
         int first = W.contact_count;
-        double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius, 0);
+        double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius, 0, W.t);
         if (d->supports) bound = MAX(bound, W.interact && !has_corners(d) ? MAX(W.soft, W.skip * d->radius) : W.soft);
         const int *list;
         int count = surfaces_near(i, &list);
@@ -319,7 +319,7 @@ int find_contacts(double h, int *woke) {
             if (!is_near(W.surfaces + k, d)) continue;
             double inside = pressed_inside(d, k), most = MAX(bound, inside ? W.soft + 2 * h * inside : 0);
             if (d->supports && W.stirs) most += 2 * h * hastes(surface_at(k, d->t), d);
-            if (has_corners(d)) most = MAX(most, left_over(d, d->impacts, k, d->radius, 0));
+            if (has_corners(d)) most = MAX(most, left_over(d, d->impacts, k, d->radius, 0, W.t));
             if (has_corners(d)) list_places(i, -1 - k, h, &places);
             if (has_corners(d) ? !add_places(i, -1 - k, most, h, &places) : !add(i, -1 - k, d->radius, most, h, 0, 0, 0)) return 0;
         }

@@ -19,7 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core import REAL, Module, borrow, constants, dtype, give_back
-from chutelab.machine.parts import Caution, Joint, Machine, Mover, Particle, Pulley, Trigger
+from chutelab.machine.parts import (
+    Caution,
+    Joint,
+    Machine,
+    Mover,
+    Particle,
+    Pulley,
+    Trigger,
+    pace_of,
+)
 from chutelab.machine.releases import RefusedError, draw
 from chutelab.machine.shapes import KINDS, Pieces
 from chutelab.scene import Fault, Plate, Scene
@@ -40,6 +49,12 @@ grid.c."""
 
 LACKS = ("length", "stiffness", "damper")
 """Keys that some joints lack."""
+
+MANY = 100
+"""Number of particles from which on a crowd without ``run.dt`` takes longer steps ..."""
+
+MOST_STEP = 2e-3
+"""... up to this, s on Earth, in the contact engine."""
 
 WORD = 2**32
 """Seeds are passed as two numbers below this."""
@@ -312,7 +327,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         landing=names.index("outgoing") if "outgoing" in names else -1,
         until=until if worded else "time",
         end_time=bound if worded else np.minimum(bound, until),
-        dt=value(scene.run, "dt"),
+        dt=_longest_step(scene, value(scene, "gravity"), value(scene.run, "dt")),
         align=scene.run.align and not scene.air_density,
         interact=scene.crowded,
         pair_restitution=pairs[..., 0],
@@ -331,6 +346,17 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         plate_warnings=warnings,
     )
     return machine.when(np.full(len(triggers), inf)) if triggers else machine
+
+
+def _longest_step(scene: Scene, gravity: Any, dt: Any) -> Any:
+    """Return the longest step of the contact engine, s.
+
+    In a large crowd without ``run.dt`` hops and overlaps ask for shorter ones. How well joints and
+    hinges keep their energy depends on the step.
+    """
+    given = "dt" in scene.run.model_fields_set or scene.joints or scene.hinges
+    many = scene.crowded and scene.count >= MANY
+    return MOST_STEP / pace_of(gravity) if many and not given else dt
 
 
 def ahead(scene: Scene) -> Machine:
@@ -354,7 +380,7 @@ def _keys(scene: Scene) -> dict[str, Any]:
         surfaces=names,
         landing=names.index("outgoing") if "outgoing" in names else -1,
         until=until if isinstance(until, str) else "time",
-        dt=scene.run.dt,
+        dt=_longest_step(scene, scene.gravity, scene.run.dt),
         air=scene.air_density,
         align=scene.run.align and not scene.air_density,
         interact=scene.crowded,

@@ -153,7 +153,16 @@ class Trigger(NamedTuple):
 
 
 EARTH = 9.81
-"""m/s²; gravity for which the engines' bounds on speeds and times hold, see `Machine.pace`."""
+"""m/s²; gravity for which the engines' bounds on speeds and times hold, see `pace_of`."""
+
+
+def pace_of(gravity: Any) -> Any:
+    """Return the factor of bounds on speeds, and divisor of bounds on times, for gravities, m/s².
+
+    √(g / 9.81 m/s²), and 1 without gravity: a run repeats if all its speeds are twice as high, all
+    its times half as long, and gravity is four times as strong.
+    """
+    return np.sqrt(np.where(np.greater(gravity, 0.0), gravity, EARTH) / EARTH)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -180,7 +189,7 @@ class Machine:
     landing: int  # surface index of the outgoing belt, -1 without one
     until: Literal["landed", "settled", "time"]  # when a particle's track ends
     end_time: float  # s; all tracks end by this time
-    dt: float  # s; step of lasting contacts (contact), longest step (pymunk)
+    dt: float  # s; longest step of the contact engine; Pymunk's are `step_of`
     align: bool  # whether the pymunk engine's steps of a lone particle end at contacts; not in air
     interact: bool  # whether particles meet each other
     pair_restitution: Floats  # (K, K), of two particles by their kinds; negative if they never meet
@@ -225,6 +234,12 @@ class Machine:
         """All scenes that it was built from, if there are several."""
         return self.scenes if isinstance(self.scenes, Family) else None
 
+    def step_of(self, engine: str) -> float:
+        """Return the longest step of an engine, s; 0 for the exact one."""
+        if engine == "pymunk":
+            return min(self.dt, self.scene.run.dt)
+        return 0.0 if engine == "exact" else self.dt
+
     @property
     def tilt(self) -> float:
         """Angle of gravity from straight down, counterclockwise, rad."""
@@ -248,12 +263,8 @@ class Machine:
 
     @cached_property
     def pace(self) -> Any:
-        """Factor of bounds on speeds, and divisor of bounds on times; (N,) in a family.
-
-        √(g / 9.81 m/s²), and 1 without gravity: a run repeats if all its speeds are twice as high,
-        all its times half as long, and gravity is four times as strong.
-        """
-        return np.sqrt(np.where(np.greater(self.gravity, 0.0), self.gravity, EARTH) / EARTH)
+        """See `pace_of`; (N,) in a family."""
+        return pace_of(self.gravity)
 
     @property
     def loads(self) -> float:

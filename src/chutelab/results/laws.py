@@ -262,7 +262,6 @@ def _lay_out(module: core.Module, recording: Record) -> None:
     books = recording.by_surface.reshape(-1)
     events = recording.events.view(_NUMBERS)
     unreal = sum(int(np.count_nonzero(~np.isfinite(events[name]))) for name in ("t", "rest"))
-    exact = recording.engine == "exact"
     interact = machine.interact or len(recording.swings) + len(recording.totals) > 0
     passing = machine.pair_restitution[: None if interact else 0] < 0.0
     laws: Any = module.structs["Laws"]
@@ -275,7 +274,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("joined", len(machine.joints) > 0), ("alike", alike(recording)), ("each", rows.ndim > 1),
         ("pulley", machine.pulley is not None), ("contacts", recording.contacts),
         ("steps", recording.steps), ("unreal", unreal),
-        ("tilt", machine.tilt), ("dt", 0.0 if exact else machine.dt),
+        ("tilt", machine.tilt), ("dt", machine.step_of(recording.engine)),
         ("mover_count", len(machine.movers)), ("swing_count", len(recording.swings)),
         ("gained", recording.gained), ("unsolved", recording.unsolved.max(initial=0.0)),
         ("largest", np.max(machine.particle.radius)), ("loose", machine.loose),

@@ -425,7 +425,7 @@ class Search:
             met=reached <= self.wanted.size,
             worst=which,
             chaotic=chaotic,
-            dt=found.scene.run.dt if found.engine in STEPPED else None,
+            dt=found.machine.step_of(found.engine) or None,
             runs=self.runs,
             against=against,
         )
@@ -478,9 +478,10 @@ class Search:
             apart(one, two, sizes(found), self.wanted.unit) for one, two in combinations(tables, 2)
         )
         what = "mean landing point" + ("" if self.wanted.unit == "m" else " and ledger")
+        dt = found.machine.step_of(found.engine)
         how = (
-            f"a crowd as a whole: the {what} of {found.engine} and {engine} at dt ="
-            f" {scene.run.dt:.3g} s, each with and without a change of the inputs by {STIR:g}"
+            f"a crowd as a whole: the {what} of {found.engine} and {engine} at dt = {dt:.3g} s,"
+            f" each with and without a change of the inputs by {STIR:g}"
         )
         return self.said(found, error, which, how, engine, chaotic=True)
 

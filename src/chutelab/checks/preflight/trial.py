@@ -386,10 +386,10 @@ def stepping(machine: Machine, engine: str, tried: Trial) -> Stepping:
         # Not every knot has the speed just before an impact; events do.
         seen = np.concatenate([run.knots["velocity"], run.events["velocity_before"]])
         speed = float(np.hypot(*seen.T).max())
-        way = speed * machine.dt
+        way = speed * machine.step_of(engine)
     aligned = engine == "contact" or (machine.align and not machine.interact)
     return Stepping(
-        dt=machine.dt,
+        dt=machine.step_of(engine),
         aligned=aligned,
         speed=speed,
         way=way,

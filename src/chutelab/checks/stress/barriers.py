@@ -54,7 +54,7 @@ class Evidence:
     @property
     def dt(self) -> float | None:
         """Its step, s; None for the exact engine."""
-        return None if self.recording.engine == "exact" else self.machine.dt
+        return self.machine.step_of(self.recording.engine) or None
 
     @property
     def alike(self) -> bool:

@@ -107,7 +107,7 @@ class Shared:
         if any(mover.hinge for mover in machine.movers):
             self.t = self.begin = min(self.begin, 0.0)
         span = machine.end_time - self.begin
-        self.most = ceil(span / machine.dt - 1e-9)
+        self.most = ceil(span / machine.step_of("pymunk") - 1e-9)
         self.h, self.steps, self.clock = span / max(self.most, 1), 0, 0
         self.waiting = [
             i for i in starts.t.argsort(kind="stable").tolist() if starts.t[i] < machine.end_time

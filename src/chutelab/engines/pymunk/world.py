@@ -480,8 +480,8 @@ class World:
                     return t
                 leaving = True
             tau = face.free(path, x, v, gap, rate, path.pull(normal))
-            if leaving and (speed := v.length + g * self.machine.dt) > 0.0:
-                tau = max(tau, min(0.5 * t + SHORT * self.machine.dt, r / speed))
+            if leaving and (speed := v.length + g * self.machine.step_of("pymunk")) > 0.0:
+                tau = max(tau, min(0.5 * t + SHORT * self.machine.step_of("pymunk"), r / speed))
             if t + tau == t:
                 return t
             if t == span or (not leaving and t + tau > span):

@@ -89,6 +89,15 @@ export interface Machine {
   falls: number[]; // s/m; inverse of the speed up to which restitution is constant
 }
 
+/** m/s² */
+const EARTH = 9.81;
+
+/** Number of particles from which on a crowd whose scene has no `run.dt` takes longer steps ... */
+const MANY = 100;
+
+/** ... up to this, s on Earth. */
+const MOST_STEP = 2e-3;
+
 /**
  * Builds the machine of a scene.
  * @throws {Fault} if the geometry contradicts itself
@@ -121,6 +130,9 @@ export function build(scene: Scene): Machine {
   // Boxes all run at once, even if they do not interact.
   const outlines = particles.map(({ outline }) => outline);
   const isAlone = !scene.crowded && outlines.some(({ length }) => length);
+  const pace = scene.gravity > 0 ? Math.sqrt(scene.gravity / EARTH) : 1;
+  const isMany = scene.crowded && scene.count >= MANY;
+  const isHung = scene.joints.length > 0 || laid.movers.some(({ inertia }) => inertia > 0);
   return waiting({
     surfaces: names,
     gravity: scene.gravity,
@@ -130,7 +142,7 @@ export function build(scene: Scene): Machine {
     landing: names.indexOf("outgoing"),
     until: typeof run.until === "string" ? run.until : "time",
     endTime: typeof run.until === "string" ? bound : Math.min(bound, run.until),
-    dt: run.dt,
+    dt: isMany && !isHung && !run.is_told ? MOST_STEP / pace : run.dt,
     interact: scene.crowded || isAlone,
     loads: run.loads ?? 0,
     segments,

@@ -180,6 +180,7 @@ export interface Scene {
   joints: Joint[];
   streams: Stream[];
   run: { until: "landed" | "settled" | number, max_time: number, dt: number,
+    is_told: boolean, // whether dt is
     engine: string, loads?: number };
   kinds: number[]; // which of the particles each stream consists of
   count: number; // of all particles
@@ -257,6 +258,7 @@ export function resolve(given: Given, lab: Lab): Scene {
     if (one.from !== undefined) one.points = [one.from, one.to];
   }
   const run = filled("run", given.run ?? {});
+  run.is_told = given.run?.dt !== undefined;
   run.until ??= outgoing === null ? "settled" : "landed";
   const count = streams.reduce((sum, stream) => sum + stream.count, 0);
   const scene: Scene = {

@@ -4,8 +4,8 @@
 
 `COUNT` equal disks are poured into boxes of some widths (m), N runs each (10 by default) that
 differ by seed, until they sleep. Each is run four times: `shipped`, as `chutelab run` does;
-`solved`, each step swept until no sweep changes a velocity by more than `ACCURATE`, or `SWEEPS`
-times; and that with the step halved once and twice. Of a packing are told
+`solved`, steps of 1 ms swept until no sweep changes a velocity by more than `ACCURATE`, or
+`SWEEPS` times; and that with the step halved once and twice. Of a packing are told
 
     height     mean height of the centres, m
     fraction   share of the area that disks cover, 3 diameters off walls and floor and from there up
@@ -42,14 +42,17 @@ COUNT, RADIUS = 150, 0.004
 SWEEPS, ACCURATE = 2000, 1e-7
 """Sweeps, and m/s: of a radius 2.5e-8 in a step."""
 
-LEVELS = {"shipped": 1, "solved": 1, "solved, dt/2": 2, "solved, dt/4": 4}
-"""By how much the step is divided."""
+LEVELS = {
+    "shipped": {}, "solved": {"dt": 1e-3}, "solved, dt/2": {"dt": 5e-4},
+    "solved, dt/4": {"dt": 2.5e-4},
+}  # fmt: skip
+"""Step, s."""
 
 TOUCH = 5e-3
 """Radii."""
 
 
-def poured(width: float, seed: int, parts: int) -> Any:
+def poured(width: float, seed: int, step: dict[str, float]) -> Any:
     """Return the machine of a box."""
     half = 0.5 * width
     walls = {"name": "box", "points": [[-half, 3.0], [-half, 0.0], [half, 0.0], [half, 3.0]]}
@@ -61,7 +64,7 @@ def poured(width: float, seed: int, parts: int) -> Any:
             "bed_height": 0.05, "speed_spread": 0.05, "interact": True, "seed": seed,
             "restitution": 0.5, "friction": 0.3,
         },
-        "run": {"until": "settled", "max_time": 20.0, "dt": 1e-3 / parts},
+        "run": {"until": "settled", "max_time": 20.0, **step},
     }  # fmt: skip
     return build(scene.from_dict(tables))
 

@@ -14,10 +14,12 @@ World W;
 /* Greatest number of tries to find the time at which an impact cuts a step with halved contacts. */
 #define CUTS 5
 /* A crowd of which more than the share MANY_DEEP of the contacts are deeper than DEEP radii as a step begins takes shorter
-   steps, down to LEAST_EASE of what hops allow: after each such step by SHORTEN, after others longer by LENGTHEN. */
+   steps, down to LEAST_EASE of what hops allow: after each such step by SHORTEN, after others longer by LENGTHEN. Steps
+   that no scene asks for are at most CHOSEN of what hops allow: with longer ones walls bear more of what fills a silo. */
 #define DEEP 4.5e-3
 #define MANY_DEEP 0.01
 #define LEAST_EASE 0.5
+#define CHOSEN 0.7
 #define SHORTEN 0.98
 #define LENGTHEN 1.01
 /* Greatest number of knots that an impact writes for a disk. */
@@ -436,7 +438,7 @@ static void judge_overlaps(void) {
         all[c->j < 0]++;
     }
     W.ease *= deep[0] > MANY_DEEP * all[0] || deep[1] > MANY_DEEP * all[1] ? SHORTEN : LENGTHEN;
-    W.ease = MIN(MAX(W.ease, LEAST_EASE), 1);
+    W.ease = MIN(MAX(W.ease, LEAST_EASE), W.chosen ? CHOSEN : 1);
 }
 
 /* Begin a step: paths of riders and sleepers, pairs that may meet, lasting contacts and their solve. If an array is too
@@ -753,7 +755,7 @@ static int begin_part(void) {
     }
     if (W.hinges) W.t = MIN(W.t, 0);
     W.looked = W.t;
-    W.ease = 1;
+    W.ease = W.chosen ? CHOSEN : 1;
     W.room = INFINITY;
     for (int k = 0; k < W.surface_count; k++) {
         double room = W.surfaces[k].radius - W.disks[W.low].radius;

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core import REAL, AsideError, Module, Status, borrow, constants, dtype, give_back
-from chutelab.machine import PASSES, SWING, Machine, Pieces, hand_over
+from chutelab.machine import PASSES, SWING, Machine, Pieces, chooses, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather, gather_lasting
 from chutelab.results.record import REASONS, Record
@@ -123,6 +123,7 @@ class Job:
         for name, value in (
             ("interact", machine.interact), ("is_whole", whole), ("until", UNTIL[machine.until]),
             ("landing", machine.landing), ("ride_owner", 0), ("dt", machine.dt),
+            ("chosen", chooses(machine.scene)),
         ):  # fmt: skip
             setattr(module.world, name, value)
         loads = module.structs["Loads"]

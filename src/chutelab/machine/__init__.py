@@ -7,7 +7,7 @@
   the core builds as it runs.
 """
 
-from chutelab.machine.builder import PASSES, ahead, build, hand_over
+from chutelab.machine.builder import PASSES, ahead, build, chooses, hand_over
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
     SWING,
@@ -24,5 +24,5 @@ from chutelab.machine.shapes import Arcs, Pieces, Segments, apart, placed
 __all__ = [
     "DRIVE_PULLEY", "PASSES", "SWING", "Arcs", "Caution", "Joint", "Machine", "Mover",
     "Particle", "Pieces", "Pulley", "RefusedError", "Segments", "ahead", "apart", "build",
-    "hand_over", "placed",
+    "chooses", "hand_over", "placed",
 ]  # fmt: skip

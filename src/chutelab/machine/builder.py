@@ -348,15 +348,18 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     return machine.when(np.full(len(triggers), inf)) if triggers else machine
 
 
-def _longest_step(scene: Scene, gravity: Any, dt: Any) -> Any:
-    """Return the longest step of the contact engine, s.
+def chooses(scene: Scene) -> bool:
+    """Return whether the contact engine chooses its steps: in a large crowd without ``run.dt``.
 
-    In a large crowd without ``run.dt`` hops and overlaps ask for shorter ones. How well joints and
-    hinges keep their energy depends on the step.
+    How well joints and hinges keep their energy depends on the step.
     """
     given = "dt" in scene.run.model_fields_set or scene.joints or scene.hinges
-    many = scene.crowded and scene.count >= MANY
-    return MOST_STEP / pace_of(gravity) if many and not given else dt
+    return scene.crowded and scene.count >= MANY and not given
+
+
+def _longest_step(scene: Scene, gravity: Any, dt: Any) -> Any:
+    """Return the longest step of the contact engine, s."""
+    return MOST_STEP / pace_of(gravity) if chooses(scene) else dt
 
 
 def ahead(scene: Scene) -> Machine:

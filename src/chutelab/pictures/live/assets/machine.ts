@@ -67,7 +67,8 @@ export interface Machine {
   landing: number; // index of the outgoing belt, -1 without one
   until: "landed" | "settled" | "time";
   endTime: number; // s
-  dt: number; // s
+  chosen: boolean; // whether the core chooses its steps
+  dt: number; // s; the longest
   interact: boolean;
   loads: number; // s; width of the bins of loads, 0 without loads
   segments: Segment[];
@@ -131,8 +132,8 @@ export function build(scene: Scene): Machine {
   const outlines = particles.map(({ outline }) => outline);
   const isAlone = !scene.crowded && outlines.some(({ length }) => length);
   const pace = scene.gravity > 0 ? Math.sqrt(scene.gravity / EARTH) : 1;
-  const isMany = scene.crowded && scene.count >= MANY;
   const isHung = scene.joints.length > 0 || laid.movers.some(({ inertia }) => inertia > 0);
+  const chosen = scene.crowded && scene.count >= MANY && !isHung && !run.is_told;
   return waiting({
     surfaces: names,
     gravity: scene.gravity,
@@ -142,7 +143,7 @@ export function build(scene: Scene): Machine {
     landing: names.indexOf("outgoing"),
     until: typeof run.until === "string" ? run.until : "time",
     endTime: typeof run.until === "string" ? bound : Math.min(bound, run.until),
-    dt: isMany && !isHung && !run.is_told ? MOST_STEP / pace : run.dt,
+    chosen, dt: chosen ? MOST_STEP / pace : run.dt,
     interact: scene.crowded || isAlone,
     loads: run.loads ?? 0,
     segments,

@@ -7,6 +7,7 @@ import pytest
 
 from chutelab import scene
 from chutelab.engines.simulation import simulate
+from chutelab.machine import chooses
 from chutelab.scene import Scene, plain, to_dict
 from chutelab.scene.tables import Stream
 from sandbox import draw
@@ -47,7 +48,9 @@ def twice_as_fast(given):
     tables.pop("live", None)
     run = given.run
     tables["gravity"] = given.gravity
-    tables["run"] = {**tables.get("run", {}), "dt": run.dt, "max_time": run.max_time}
+    tables["run"] = {**tables.get("run", {}), "max_time": run.max_time}
+    if not chooses(given):
+        tables["run"]["dt"] = run.dt
     rows = tables.get("stream", {})
     rows = [rows] if isinstance(rows, dict) else rows
     default = {"rate": Stream().rate}

@@ -158,10 +158,10 @@ void tell_frozen(Frozen *f, int sleeper, const double *J, double to) {
 /* Share of a change of force that a smooth surface takes across its normal. */
 #define SMOOTH 1e-4
 
-enum { RESIDUAL, DIRECTION, SOLUTION, PRODUCT };
+enum { RESIDUAL, DIRECTION, SOLUTION, PRODUCT, STIFF, VECTORS };
 
-/* One of the four vectors of conjugate gradients, at a disk. */
-static double *of(int disk, int which) { return W.balance + 8 * disk + 2 * which; }
+/* One of the vectors of conjugate gradients, at a disk; of STIFF the first number, the sum of the squares of its forces. */
+static double *of(int disk, int which) { return W.balance + 2 * (VECTORS * disk + which); }
 
 /* Whether the forces on a disk are balanced now: it has just fallen asleep, or the rest of its island has. */
 static int is_new(int i) { return sleeps(i) && W.disks[i].balanced == W.t; }
@@ -192,6 +192,10 @@ static void multiply(int which, int to) {
         }
     }
 }
+
+/* The residual at a disk, divided by what holds it: forces differ a thousandfold, and the rounds take as long as the greatest
+   ratio of their squares asks for. */
+static double eased(int i, int n) { return of(i, STIFF)[0] > 0 ? of(i, RESIDUAL)[n] / of(i, STIFF)[0] : 0; }
 
 /* Set a vector to 0 at disks that are not balanced now; return the sum of its squares. */
 static double square_of(int which) {
@@ -232,7 +236,7 @@ void balance_sleepers(void) {
     begin_whole();
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
-        for (int n = 0; n < 8; n++) of(i, 0)[n] = 0;
+        for (int n = 0; n < 2 * VECTORS; n++) of(i, 0)[n] = 0;
         of(i, RESIDUAL)[0] = -d->mass * W.gx;
         of(i, RESIDUAL)[1] = -d->mass * W.gy;
     }
@@ -243,11 +247,21 @@ void balance_sleepers(void) {
             of(f->i, RESIDUAL)[n] -= force;
             if (f->j >= 0) of(f->j, RESIDUAL)[n] += force;
         }
-    double size = square_of(RESIDUAL);
-    for (int i = W.low; i < W.high; i++)
-        for (int n = 0; n < 2; n++) of(i, DIRECTION)[n] = of(i, RESIDUAL)[n];
-    for (int round = 0; round < ROUNDS && size > square(BALANCED) * weight; round++) {
-        double along = 0, now;
+    for (const Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
+        if (f->from != W.t) continue;
+        double strong = square(f->force[0] + f->more[0]) + square(f->force[1] + f->more[1]);
+        of(f->i, STIFF)[0] += strong;
+        if (f->j >= 0) of(f->j, STIFF)[0] += strong;
+    }
+    double size = 0, left = square_of(RESIDUAL);
+    for (int round = 0; round < ROUNDS && left > square(BALANCED) * weight; round++) {
+        double along = 0, before = size;
+        size = 0;
+        for (int i = W.low; i < W.high; i++)
+            for (int n = 0; n < 2; n++) size += of(i, RESIDUAL)[n] * eased(i, n);
+        for (int i = W.low; i < W.high; i++)
+            for (int n = 0; n < 2; n++)
+                of(i, DIRECTION)[n] = eased(i, n) + (round ? size / before * of(i, DIRECTION)[n] : 0);
         for (int i = W.low; i < W.high; i++) of(i, PRODUCT)[0] = of(i, PRODUCT)[1] = 0;
         multiply(DIRECTION, PRODUCT);
         square_of(PRODUCT);
@@ -259,10 +273,7 @@ void balance_sleepers(void) {
                 of(i, SOLUTION)[n] += size / along * of(i, DIRECTION)[n];
                 of(i, RESIDUAL)[n] -= size / along * of(i, PRODUCT)[n];
             }
-        now = square_of(RESIDUAL);
-        for (int i = W.low; i < W.high; i++)
-            for (int n = 0; n < 2; n++) of(i, DIRECTION)[n] = of(i, RESIDUAL)[n] + now / size * of(i, DIRECTION)[n];
-        size = now;
+        left = square_of(RESIDUAL);
     }
     for (Frozen *f = W.frozen; f < W.frozen + W.frozen_count; f++) {
         double given[2];

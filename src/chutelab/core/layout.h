@@ -421,7 +421,7 @@ typedef struct {
     Frozen *frozen;      /* (2 contacts) contacts of sleepers */
     int *frozen_links;   /* (4 contacts) row n has the ends 2 n and 2 n + 1: the next end of the same disk, or -1 */
     int *borders;        /* (2 contacts) rows of `frozen` of which one is a sleeper and the other one is not */
-    double *balance;     /* (disks, 4, 2) room for conjugate gradients */
+    double *balance;     /* (disks, 5, 2) room for conjugate gradients */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */
     int *near_links;     /* (2 near) the next place in `near` of the same disk, or -1 */

@@ -302,7 +302,7 @@ static int lay_out_work(void) {
     for (W.bucket_count = 1; crowd && W.bucket_count <= 4 * n + 16;) W.bucket_count *= 2;
     W.cell_room = crowd ? 12 * n + 64 : 1;
     RESERVE(W.tracks, n);
-    RESERVE(W.balance, crowd ? 8.0 * n : 0);
+    RESERVE(W.balance, crowd ? 10.0 * n : 0);
     RESERVE(W.solver_bodies, n + 1.0 + W.mover_count);
     RESERVE(W.edges, 3.0 * W.outline_count);
     RESERVE(W.poses, W.outline_count ? 6.0 * n : 0);

@@ -349,6 +349,8 @@ def test_of_what_is_poured_one_overlap_in_a_hundred_is_deeper_than_half_a_percen
     [
         (100, 0.012, {}, G, 2e-3),
         (100, 0.006, {}, G, 0.7 * sqrt(0.008 * 0.006 / G)),
+        (100, 0.002, {}, G, 1e-3),
+        (100, 0.001, {}, G, sqrt(0.008 * 0.001 / G)),
         (99, 0.006, {}, G, 1e-3),
         (100, 0.006, {"dt": 5e-4}, G, 5e-4),
         (100, 0.006, {"dt": 0.1}, G, sqrt(0.008 * 0.006 / G)),
@@ -356,7 +358,7 @@ def test_of_what_is_poured_one_overlap_in_a_hundred_is_deeper_than_half_a_percen
     ],
 )
 def test_a_hundred_disks_that_roll_take_longer_steps_than_fewer(count, r, run_, gravity, longest):
-    """Up to 2 ms and 0.7 √(0.008 r / g); Pymunk's stay at 1 ms, and so do those asked for."""
+    """Up to 2 ms and 0.7 √(0.008 r / g), never shorter than fewer; Pymunk's stay at 1 ms."""
     rolling = {
         "gravity": gravity,
         "particle": {"radius": r, "mass": 0.01, "spin": True},

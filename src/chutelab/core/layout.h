@@ -501,7 +501,8 @@ typedef struct {
     int stamp, shocks, jams; /* numbers of the latest query, shock and jam, for marks */
     double t, now, step, step_end, cell;
     double looked;       /* s; time for which it is set which surfaces exist */
-    int chosen;          /* [in] whether `dt` is not the scene's: steps stay further below what hops allow */
+    double chosen;       /* [in] s; the usual step if `dt` is not the scene's: longer ones stay further below what hops allow */
+    double easiest;      /* greatest `ease` in this step */
     double ease;         /* share of the step that hops allow which a crowd takes, less while overlaps are deep */
     double usual;        /* s; the step unless something cuts it short; what a step corrects is for this length */
     double length, length_before; /* s; of this step and of the one before */

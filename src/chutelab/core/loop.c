@@ -15,7 +15,8 @@ World W;
 #define CUTS 5
 /* A crowd of which more than the share MANY_DEEP of the contacts are deeper than DEEP radii as a step begins takes shorter
    steps, down to LEAST_EASE of what hops allow: after each such step by SHORTEN, after others longer by LENGTHEN. Steps
-   that no scene asks for are at most CHOSEN of what hops allow: with longer ones walls bear more of what fills a silo. */
+   that no scene asks for are at most CHOSEN of what hops allow, or the usual one: with longer ones walls bear more of what
+   fills a silo. */
 #define DEEP 4.5e-3
 #define MANY_DEEP 0.01
 #define LEAST_EASE 0.5
@@ -438,7 +439,7 @@ static void judge_overlaps(void) {
         all[c->j < 0]++;
     }
     W.ease *= deep[0] > MANY_DEEP * all[0] || deep[1] > MANY_DEEP * all[1] ? SHORTEN : LENGTHEN;
-    W.ease = MIN(MAX(W.ease, LEAST_EASE), W.chosen ? CHOSEN : 1);
+    W.ease = MIN(MAX(W.ease, LEAST_EASE), W.easiest);
 }
 
 /* Begin a step: paths of riders and sleepers, pairs that may meet, lasting contacts and their solve. If an array is too
@@ -454,7 +455,8 @@ static int begin_step(void) {
         double press = W.g + W.haste + (has_corners(d) && d->mode == FREE ? whirl_of(d) : 0);
         h = MIN(h, hop_time(d, press));
     }
-    h = MIN(W.ease * h, W.dt);
+    W.easiest = W.chosen > 0 ? MIN(MAX(CHOSEN, W.chosen / h), 1) : 1;
+    h = MIN(MIN(W.ease, W.easiest) * h, W.dt);
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     if (W.hinges) h = hinge_step(h);
     W.usual = h;
@@ -755,7 +757,7 @@ static int begin_part(void) {
     }
     if (W.hinges) W.t = MIN(W.t, 0);
     W.looked = W.t;
-    W.ease = W.chosen ? CHOSEN : 1;
+    W.ease = 1;
     W.room = INFINITY;
     for (int k = 0; k < W.surface_count; k++) {
         double room = W.surfaces[k].radius - W.disks[W.low].radius;

@@ -123,7 +123,7 @@ class Job:
         for name, value in (
             ("interact", machine.interact), ("is_whole", whole), ("until", UNTIL[machine.until]),
             ("landing", machine.landing), ("ride_owner", 0), ("dt", machine.dt),
-            ("chosen", chooses(machine.scene)),
+            ("chosen", machine.scene.run.dt / machine.pace if chooses(machine.scene) else 0.0),
         ):  # fmt: skip
             setattr(module.world, name, value)
         loads = module.structs["Loads"]

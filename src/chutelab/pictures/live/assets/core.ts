@@ -179,7 +179,7 @@ class Core extends Memory {
       landing: machine.landing, ride_owner: 0, pulley: pulley ? machine.segments.length : -1,
       ride_incline: pulley ? pulley.incline : 0, g: machine.gravity,
       tilt: machine.tilt, air: machine.air,
-      dt: machine.dt, chosen: Number(machine.chosen), end_time: machine.endTime,
+      dt: machine.dt, chosen: machine.chosen, end_time: machine.endTime,
     });
     this.work("lay_out_world");
     this.doubles.set(outlines.flat(2), this.get("outlines") >> 3);

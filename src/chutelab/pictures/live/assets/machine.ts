@@ -67,7 +67,7 @@ export interface Machine {
   landing: number; // index of the outgoing belt, -1 without one
   until: "landed" | "settled" | "time";
   endTime: number; // s
-  chosen: boolean; // whether the core chooses its steps
+  chosen: number; // s; the usual step if the core chooses its steps, else 0
   dt: number; // s; the longest
   interact: boolean;
   loads: number; // s; width of the bins of loads, 0 without loads
@@ -133,7 +133,7 @@ export function build(scene: Scene): Machine {
   const isAlone = !scene.crowded && outlines.some(({ length }) => length);
   const pace = scene.gravity > 0 ? Math.sqrt(scene.gravity / EARTH) : 1;
   const isHung = scene.joints.length > 0 || laid.movers.some(({ inertia }) => inertia > 0);
-  const chosen = scene.crowded && scene.count >= MANY && !isHung && !run.is_told;
+  const isChosen = scene.crowded && scene.count >= MANY && !isHung && !run.is_told;
   return waiting({
     surfaces: names,
     gravity: scene.gravity,
@@ -143,7 +143,7 @@ export function build(scene: Scene): Machine {
     landing: names.indexOf("outgoing"),
     until: typeof run.until === "string" ? run.until : "time",
     endTime: typeof run.until === "string" ? bound : Math.min(bound, run.until),
-    chosen, dt: chosen ? MOST_STEP / pace : run.dt,
+    chosen: isChosen ? run.dt / pace : 0, dt: isChosen ? MOST_STEP / pace : run.dt,
     interact: scene.crowded || isAlone,
     loads: run.loads ?? 0,
     segments,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core import REAL, AsideError, Module, Status, borrow, constants, dtype, give_back
-from chutelab.machine import PASSES, SWING, Machine, Pieces, chooses, hand_over
+from chutelab.machine import PASSES, SWING, Machine, Pieces, chooses, hand_over, pace_of
 from chutelab.results.laws import take
 from chutelab.results.loads import gather, gather_lasting
 from chutelab.results.record import REASONS, Record
@@ -120,10 +120,12 @@ class Job:
         self.events: list[NDArray[Any]] = []
         # First disk of the part in which the run was stopped; later ones have not ended.
         self.stopped_from, self.owners = machine.count, len(machine.surfaces)
+        scene = machine.scene
+        usual = scene.run.dt / pace_of(scene.gravity)
         for name, value in (
             ("interact", machine.interact), ("is_whole", whole), ("until", UNTIL[machine.until]),
             ("landing", machine.landing), ("ride_owner", 0), ("dt", machine.dt),
-            ("chosen", machine.scene.run.dt / machine.pace if chooses(machine.scene) else 0.0),
+            ("chosen", usual * chooses(scene)),
         ):  # fmt: skip
             setattr(module.world, name, value)
         loads = module.structs["Loads"]

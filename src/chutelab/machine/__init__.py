@@ -17,6 +17,7 @@ from chutelab.machine.parts import (
     Mover,
     Particle,
     Pulley,
+    pace_of,
 )
 from chutelab.machine.releases import RefusedError
 from chutelab.machine.shapes import Arcs, Pieces, Segments, apart, placed
@@ -24,5 +25,5 @@ from chutelab.machine.shapes import Arcs, Pieces, Segments, apart, placed
 __all__ = [
     "DRIVE_PULLEY", "PASSES", "SWING", "Arcs", "Caution", "Joint", "Machine", "Mover",
     "Particle", "Pieces", "Pulley", "RefusedError", "Segments", "ahead", "apart", "build",
-    "chooses", "hand_over", "placed",
+    "chooses", "hand_over", "pace_of", "placed",
 ]  # fmt: skip

@@ -319,6 +319,29 @@ def test_stream_presses_nobody_and_loses_no_joule():
     assert {REASONS[k] for k in recording.ended} == {"settled"}
 
 
+@pytest.mark.parametrize("seed", [6, 16, 23])
+def test_friction_of_a_blow_in_a_corner_stays_within_its_bound(seed):
+    """|J_t| <= µ J_n, where a wall and the floor are solved together."""
+    width, µ = 0.3, 0.3
+    thrown = {
+        "particle": {"radius": 0.01, "spin": True},
+        "surface": [
+            {"name": "box", "points": [[-width / 2, 4.0], [-width / 2, 0.0],
+                                       [width / 2, 0.0], [width / 2, 4.0]],
+             "restitution": 0.5, "friction": µ},
+        ],
+        "stream": {"count": 100, "rate": 500.0 * width, "at": [-0.4 * width, 1.5],
+                   "velocity": [2.5 * width, 0.0], "interact": True, "bed_height": 0.5,
+                   "seed": seed},
+        "run": {"until": 1.0, "dt": 1e-3},
+    }  # fmt: skip
+    blows = run(build(scene.from_dict(thrown))).select(Kind.IMPACT)
+    assert len(blows) > 1000
+    assert np.all(
+        np.abs(blows["tangential_impulse"]) <= (1.0 + 1e-12) * µ * blows["normal_impulse"]
+    )
+
+
 def test_of_what_is_poured_one_overlap_in_a_hundred_is_deeper_than_half_a_percent():
     """Of the radius; the deepest is no more than three times that: pairs and walls."""
     drawn = {

@@ -420,7 +420,8 @@ int lessen(void) {
     return 1;
 }
 
-/* Cut friction down to its bound. It may exceed that where sweeps were cut off, as normal impulses have changed since. */
+/* Cut friction down to its bound. It may exceed that by the last change of its normal impulse: by momentum where sweeps were
+   cut off, in corners by the last `press_corner`. */
 void keep_bounds(void) {
     for (SolverRow *c = W.rows; c < W.rows + rows; c++) {
         double bound = c->rough * c->impulse[0], arm = c->arm * c->impulse[0];

@@ -108,7 +108,7 @@ int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, 
         ended = change <= accurate;
         /* What sweeps by fours have brought to their end needs finer ones. */
         light &= !ended;
-        if (!ended) keep_bounds();
+        keep_bounds();
         if (!ended || W.interact) lessened = lessen();
         if (left == 0) break;
         int stalled = driven && change < INFINITY && stall(list, count, INFINITY, enough);

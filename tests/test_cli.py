@@ -179,8 +179,8 @@ def test_the_papers_energy_and_power_are_marked_and_the_true_power_is_beside_the
     [
         # m v_b (v_b - v_x)/3 and m v_b (v_b - v_x), with 8 g, 2 m/s and -1 m/s
         ("belt-landing", ["particle.spin=true", "outgoing.length=8"],
-         "1 disk rolls on the outgoing belt: nothing slips, and nothing is carried along. "
-         "The belt has paid 0.016 J, loads that are carried take 0.048 J", []),
+         "1 disk rolls on the outgoing belt without slip, instead of being carried. "
+         "The belt work is 0.016 J; carried loads would take 0.048 J", []),
         # One layer, 1 ms apart, 6.3 ms to get out of the way, looked at each ms: 6 and 12 ms late.
         ("stream", ["stream.count=3", "stream.rate=1000", "stream.bed_height=0"],
          "2 particles waited for a free place to be released, 0.012 s at most", ["stream.count=3"]),
@@ -522,7 +522,7 @@ def test_check_says_what_will_happen():
     said = table_of(text)
     assert said["outgoing"] == f"from (-2, {belt:.6g}) to (4, {belt:.6g}) m, moving at 2 m/s"
     assert said["surfaces"] == "the scene has no [[surface]]"
-    assert said["engine"] == "exact: a lone particle meets surfaces only"
+    assert said["engine"] == "exact: a single particle meets only surfaces"
     assert said["ends"].endswith("at most at t = 30 s")
     assert said["contacts"] == "about 2"
     assert said["run time"].startswith("about ")
@@ -531,7 +531,7 @@ def test_check_says_what_will_happen():
     assert "warning" not in text
     said = table_of(call("check", "stream").stdout)
     assert said["engine"].startswith("contact: particles meet each other, ")
-    assert said["tunnelling"] == "none at any speed: blows have their own instants"
+    assert said["tunnelling"] == "none at any speed: impacts are found at their own times"
     assert said["leaves out"] == "all of it"
     assert "at t = 0.7 s" in call("check", "slip", "--set", "run.until=0.7").stdout
 
@@ -771,7 +771,7 @@ def test_a_run_that_takes_too_long_ends_with_what_is_recorded():
         "png,npz,json",
     )
     text = " ".join(call(*run).stdout.split())
-    assert re.search(r"ended: 200 stopped .* STOPPED before it was over, with \d+ particles", text)
+    assert re.search(r"ended: 200 stopped .* STOPPED before the end, with \d+ particles", text)
     assert re.search(r"under way and 1\d\d", text)
     assert sorted(path.name for path in Path("out").iterdir()) == files
     told = json.loads(Path("out/summary.json").read_text())

@@ -73,7 +73,7 @@ def test_what_a_scene_does_not_need_is_skipped_with_the_reason(brief):
 @pytest.mark.parametrize(
     ("name", "overrides", "engine", "why"),
     [
-        ("perpendicular", [], "exact", "a lone particle meets surfaces only"),
+        ("perpendicular", [], "exact", "a single particle meets only surfaces"),
         ("stream-independent", [], "exact", "particles do not meet each other"),
         ("stream", [], "contact", "particles meet each other"),
         ("slip", ["run.engine=contact"], "contact", 'run.engine = "contact" asks for it'),
@@ -91,7 +91,10 @@ def test_the_engine_is_the_one_that_will_run(name, overrides, engine, why):
 
 def test_the_end_of_the_run_is_told():
     assert look("slip", "run.until=0.7").ends == "at t = 0.7 s"
-    assert look("slip").ends == "each particle when it has landed (or gone), at most at t = 30 s"
+    assert (
+        look("slip").ends
+        == "each particle when it has landed or has left the scene, at most at t = 30 s"
+    )
     assert look("stream", "stream.count=2").ends.startswith("when all are at rest")
 
 
@@ -220,7 +223,7 @@ def test_the_bounces_to_come_follow_from_those_that_were(restitution, until, mon
     shares, whole = looks(scene)
     found = look_at(monkeypatch, scene, len(shares) // 4)
     assert not found.at_least
-    assert "got through" in found.how
+    assert "% of the run" in found.how
     assert found.seconds == pytest.approx(len(shares), rel=0.1)
     assert found.contacts == pytest.approx(whole.contacts, rel=0.1)
 
@@ -257,7 +260,7 @@ def test_what_a_trial_hardly_begins_is_not_known(monkeypatch):
     monkeypatch.setattr(trial, "MOST", 20)
     some = look("stream").effort
     assert some.at_least
-    assert some.how == "a trial run of 20 of 200 particles"
+    assert some.how == "a trial run with 20 of 200 particles"
     monkeypatch.setattr(trial, "PATIENCE", 0.0)
     shown = str(look("stream"))
     assert re.search(r"run time +not known, at least \d", shown)
@@ -433,7 +436,7 @@ def test_what_a_trial_tells_of_the_whole_run(engine, marks, seconds):
 def test_a_trial_takes_a_second_of_processor_time(monkeypatch):
     monkeypatch.setattr(trial, "process_time", Clock(0.2))
     scene = sc.load("stream", ["stream.count=30", "run.engine=pymunk", "run.until=2"])
-    assert preflight(scene).effort.how.startswith("a trial run of 1 s got through")
+    assert preflight(scene).effort.how.startswith("a trial run of 1 s covered")
 
 
 def test_a_run_that_its_bound_stops_is_noticed():

@@ -104,7 +104,7 @@ def test_an_interrupted_sweep_of_another_number_of_seeds_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "count", "said"), [
-    ("perpendicular", 3, "nothing is drawn of a lone particle"),
+    ("perpendicular", 3, "nothing is drawn at random for a single particle"),
     ("stream", 0, "a whole number from 1"),
     ("stream", 5000, "to 1000"),
 ])  # fmt: skip

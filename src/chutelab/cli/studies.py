@@ -486,7 +486,7 @@ def discharge(
     try:
         wanted = [float(part) for part in heights.split(",")] if heights else HEIGHTS
     except ValueError:
-        raise InputError(f"{heights!r}: numbers such as 0,-0.5,-1", "--heights") from None
+        raise InputError(f"{heights!r}: must be numbers such as 0,-0.5,-1", "--heights") from None
     loaded = loaded_as_told(scene, set_)
     names = ("discharge.png", "discharge.json")
     with destination(out, names) as place:

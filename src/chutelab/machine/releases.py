@@ -212,7 +212,7 @@ def _fault(scenes: Scene | Family, refusal: Any, member: int) -> Fault:
     if why == reasons["BOX_FULL"]:
         fewer = f", or stream{several}.count = {particle} at most" if particle else ""
         allowed = (
-            f"a larger box{fewer}: {particle or 'none'} of radius {reach:.4g} m have room in it,"
+            f"a larger box{fewer}: {particle or 'none'} of radius {reach:.4g} m fit into this one,"
             " away from all surfaces"
         )
         value = [list(corner) for corner in stream.fill or ()]

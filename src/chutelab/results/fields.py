@@ -270,7 +270,7 @@ def fields(
     last = float(recording.knots["t"].max(initial=0.0))
     begin, end = 0.0 if begin is None else begin, last if end is None else end
     if not 0.0 <= begin < end <= last * (1.0 + 1e-12):
-        allowed = f"two times from 0 to {last:g} s, the second one later"
+        allowed = f"must be two times from 0 to {last:g} s, the second one later"
         raise InputError(allowed, "window", [begin, end])
     if samples < 1:
         raise InputError("a whole number above 0", "samples", samples)

@@ -312,7 +312,7 @@ class Crowd(Shown):
         Without `details` a spread by rounding is shown as 0.
         """
         rows: list[tuple[str, ...]] = []
-        notes = [f"where they are, or went: {told_fates(self.fates)}"]
+        notes = [f"where they ended: {told_fates(self.fates)}"]
         if self.arrival is not None and self.landing is not None:
             came, landed = self.arrival["count"], self.landing["count"]
             notes.insert(
@@ -337,7 +337,7 @@ class Crowd(Shown):
                 said = f"{number(self.whole_flow)} t/h, {self.width:g} m wide ({said})"
             notes.append(f"flow onto the belt: {said}")
         notes += [
-            f"{name}: 96 % of the paths are within {1e3 * size:.3g} mm half-way"
+            f"{name}: half-way to the belt, 96 % of the paths lie within {1e3 * size:.3g} mm"
             for name, size in self.thick.items()
         ]
         heads = ("", *COLUMNS.values()) if rows else ()

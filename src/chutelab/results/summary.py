@@ -54,9 +54,8 @@ class Stopped:
     def __str__(self) -> str:
         after = f" and {self.unreleased:,} not yet released" if self.unreleased else ""
         return (
-            f"STOPPED before it was over, with {many(self.particles, 'particle', ',')} under way"
-            f"{after}: all of it is recorded up to t = {number(self.t)} s, and sums are of what is"
-            " recorded"
+            f"STOPPED before the end, with {many(self.particles, 'particle', ',')} under way"
+            f"{after}: recorded up to t = {number(self.t)} s, and all sums count up to then"
         )
 
 
@@ -132,8 +131,8 @@ class Plug:
     def __str__(self) -> str:
         return (
             f"{many(self.still, 'particle', ',')} {'lies' if self.still == 1 else 'lie'} still in"
-            f" the machine at the end, {self.through:,} got through: it is plugged, or something"
-            " holds them where nothing carries them on"
+            f" the machine at the end, {self.through:,} got through: the machine is plugged, or"
+            " they lie where nothing moves them on"
         )
 
 
@@ -207,10 +206,10 @@ class Rolling:
     def __str__(self) -> str:
         rolls = "rolls" if self.particles == 1 else "roll"
         return (
-            f"{many(self.particles, 'disk')} {rolls} on the outgoing belt: nothing slips, and"
-            f" nothing is carried along. The belt has paid {number(self.belt_work)} J, loads that"
-            f" are carried take {number(self.belt_work_carried)} J (a disk that arrives without"
-            " turning takes a third of a carried load's work)"
+            f"{many(self.particles, 'disk')} {rolls} on the outgoing belt without slip, instead of"
+            f" being carried. The belt work is {number(self.belt_work)} J; carried loads would take"
+            f" {number(self.belt_work_carried)} J (a disk that arrives without turning takes a"
+            " third of a carried load's work)"
         )
 
 

@@ -215,7 +215,9 @@ def drawn(scene: Scene, repeat: int, keys: Sequence[str] = ()) -> None:
         raise InputError(f"must be a whole number from 1 to {MOST_SEEDS}", typed)
     several = scene.count > len(scene.streams) or any(key.endswith("count") for key in keys)
     if repeat > 1 and not several:
-        raise InputError("nothing is drawn of a lone particle: all seeds give the same", typed)
+        raise InputError(
+            "nothing is drawn at random for a single particle: all seeds give the same", typed
+        )
 
 
 def reason(error: SceneError) -> str:

@@ -277,8 +277,8 @@ def advice(
         yield Advice(
             f"the run may need {cost.memory / 1e9:.2g} GB of memory, and the machine has"
             f" {there / 1e9:.2g} GB",
-            "a smaller stream.count, or less time to run.until; chutelab run --max-seconds ends a"
-            " run with what is recorded",
+            "a smaller stream.count, or an earlier run.until; chutelab run --max-seconds stops a"
+            " run and keeps what is recorded",
             {},
         )
     waited = None if tried.recording is None else waits(tried.recording)
@@ -467,24 +467,26 @@ def preflight(scene: AnyScene) -> Preflight:
         why = unjoined(machine) if machine.joints else ""
         why = why or "the contact engine does not have all of it with boxes and polygons"
     elif machine.joints:
-        why = "strings, rods, springs and pins pull, which the exact engine does not follow"
+        why = "the exact engine has no strings, rods, springs and pins"
     elif scene.cornered:
-        why = "boxes and polygons have corners, which the exact engine does not follow"
+        why = "the exact engine has no boxes and polygons"
     elif machine.interact:
-        why = "particles meet each other, which the exact engine does not follow"
+        why = "particles meet each other, which the exact engine cannot run"
     elif machine.count == 1:
-        why = "a lone particle meets surfaces only"
+        why = "a single particle meets only surfaces"
     else:
         why = "particles do not meet each other"
     if tried.recording is not None and tried.recording.engine != engine:
         engine = tried.recording.engine
-        why = "a spinning disk between surfaces of which one moves is beyond the exact engine"
+        why = "the exact engine cannot run a spinning disk between two surfaces of which one moves"
     ends = f"at t = {machine.end_time:.6g} s"
     if machine.until != "time":
-        what = "each particle when it has landed"
+        what = "each particle when it has landed or has left the scene"
         if machine.until == "settled":
-            what = "when all are at rest" if machine.interact else "each particle at rest"
-        ends = f"{what} (or gone), at most {ends}"
+            what = "each particle when it is at rest or has left the scene"
+            if machine.interact:
+                what = "when all are at rest or have left the scene"
+        ends = f"{what}, at most {ends}"
     steps = None if engine == "exact" else stepping(machine, engine, tried)
     cost = effort(machine, tried, setup, grown)
     cost = replace(cost, extras=tuple(extras(machine, tried, cost)))

@@ -57,7 +57,7 @@ class Stepping:
         if self.aligned:
             return [
                 ("steps", f"at most {longest} while contacts last"),
-                ("tunnelling", "none at any speed: blows have their own instants"),
+                ("tunnelling", "none at any speed: impacts are found at their own times"),
             ]
         room = f"a surface catches it within {write_size(self.bound, 'm')}"
         passing = f"nothing moved in the trial run; {room}"
@@ -230,7 +230,7 @@ def skipped(
     if engine == "exact":
         yield Part("steps", "the next event is solved for, so no flight is stepped")
     elif engine == "contact" or (machine.align and not machine.interact):
-        yield Part("flights", "only contacts that last are stepped, blows have their own instants")
+        yield Part("flights", "only lasting contacts take steps, impacts have their own times")
     if machine.until == "landed":
         yield Part("what follows", 'the first touch of the outgoing belt: run.until = "landed"')
     if scene.air_density:
@@ -438,7 +438,7 @@ def effort(machine: Machine, tried: Trial, setup: float, grown: int) -> Effort:
     count, some = machine.count, recording.count
     if tried.trouble or (tried.whole and some == count):
         seconds = setup + tried.seconds + tried.warming
-        how = "until it gets stuck" if tried.trouble else "timed in a run of it all"
+        how = "until it gets stuck" if tried.trouble else "measured in a complete run"
         memory = max(_memory(recording, machine, 1.0), least)
         return Effort(recording.contacts, seconds, False, how, memory)
     together = _together(recording)
@@ -456,9 +456,9 @@ def effort(machine: Machine, tried: Trial, setup: float, grown: int) -> Effort:
         guesses, share = [took * count / some], 0.0
     spread = max(guesses) / min(guesses)
     known = spread <= SPREAD and (recording.engine == "exact" or share >= FEWEST)
-    how = f"a trial run of {took:.1g} s got through {100.0 * share:.2g} % of it"
+    how = f"a trial run of {took:.1g} s covered {100.0 * share:.2g} % of the run"
     if some < count:
-        how = f"a trial run of {some:,} of {count:,} particles"
+        how = f"a trial run with {some:,} of {count:,} particles"
     seconds = min(guesses) * spread**LATE if known else max(took, min(guesses) / 2.0)
     contacts = round(recording.contacts * seconds / took)
     if known and tried.lone is not None and stopped(tried.lone) is None:

@@ -98,10 +98,10 @@ def show(
     chutelab lesson show 3 --language de
     chutelab lesson show ./my-lesson
 
-    --sheet  One sheet to hand out: the student's (nothing of the answer on it), the teacher's
-        (key, mistakes, goals), or the explanation.
-    -o, --out FILE  Write the sheet into this file: its ending, .md, .html or .pdf, says what it is
-        to be. Or into a folder.
+    --sheet  One sheet to hand out: the student's (without answers), the teacher's (key, mistakes,
+        goals), or the explanation.
+    -o, --out FILE  Write the sheet into this file, or into a folder. The ending of the file, .md,
+        .html or .pdf, sets the format.
     --format  Markdown, a web page in one file, or A4 to print (which needs the extra
         chutelab[pdf]); default: as the file's name says, in a folder pdf.
     --all  The sheet of every shipped lesson.
@@ -181,16 +181,16 @@ def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | N
 def build(lessons: LessonNames = (), *, out: Folder, force: bool, quiet: bool) -> None:
     """Make lesson.gif and exercise.ipynb of each LESSON (default: all shipped), where they changed.
 
-    The notebooks are made of the steps in lesson.toml, notebook.py and the exercise. There is one
-    film and one notebook for each language that the texts are there in: lesson.de.gif is German.
+    The notebooks are made from the steps in lesson.toml, notebook.py and the exercise. There is one
+    film and one notebook for each language of the texts: lesson.de.gif is German.
 
     A picture is up to date if it was made from the same scene and settings with the same versions
-    of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes
-    the same bytes.
+    of chutelab, numpy, pymunk, matplotlib and pillow; a comment in the GIF records them. The same
+    inputs make the same bytes.
 
     --out DIR  Write each picture into a folder NN-name in here, not into the lesson's own: for an
         installed chutelab, whose folders cannot be written to.
-    --force  Make them anew, changed or not.
+    --force  Make them even if nothing has changed.
     """
     from chutelab.classroom.lessons import find
     from chutelab.classroom.lessons.building import build as build_lesson
@@ -252,17 +252,17 @@ def page(
 ) -> None:
     """Bundle lessons (without LESSON: all that are shipped) into a folder of web pages.
 
-    index.html, and for each lesson its worksheet, animation, files, and a live page, which offers
-    what [page.live] of lesson.toml says. All links are relative: the folder works from a memory
-    stick, from any static web server, and on a phone. A live page has the lesson's exercise in it,
-    with numbers of one's own, and saves what is to be handed in. The wheel of this chutelab is
-    beside them, and index.html says how to install it, for the notebooks.
+    The folder has index.html and, for each lesson, its worksheet, animation, files, and a live page
+    that offers what [page.live] of lesson.toml says. All links are relative: the folder works from
+    a memory stick, from any static web server, and on a phone. A live page contains the lesson's
+    exercise, with numbers for each student, and saves the file to hand in. For the notebooks, the
+    folder has the wheel of this chutelab, and index.html says how to install it.
 
     With one LESSON and a FOLDER that ends in .html, only that lesson's live page is written, into a
     file of that name.
 
     -o, --out DIR  The folder, or FILE.html; files that are there are replaced. [required]
-    --wheel / --no-wheel  With what students install, or without.
+    --wheel / --no-wheel  With or without the wheel that students install for the notebooks.
     """
     from chutelab.classroom.lessons.pages import bundle, live_page
 
@@ -288,10 +288,10 @@ def scorm(
 ) -> None:
     """Make a SCORM 1.2 package of each LESSON: its live page with its exercise, for a course.
 
-    The platform tells the page each student's name, from which the numbers are drawn, and keeps the
-    score (0 to 100, a share of right answers), whether the lesson is completed (every question is
-    right, or its working was shown), each answer, the time, and where to go on next time. The page
-    asks for nothing from the network; students install nothing.
+    The platform gives the page each student's name, from which the numbers are drawn. It keeps the
+    score (0 to 100, the share of right answers), whether the lesson is completed (each question is
+    right, or its working was shown), each answer, the time, and where to continue next time. The
+    page loads nothing from the network; students install nothing.
 
     Moodle  "Add an activity", "SCORM package", and the zip into "Package file".
             Appearance: "New window" gives it room. Grade: "Highest grade", maximum 100.
@@ -367,22 +367,21 @@ def grade(
     """Mark each question of the exercises that students returned.
 
     They return notebooks (*.ipynb), or the result files that a lesson's live page writes (*.json);
-    a folder stands for all in it, also in its folders. What a student checked is judged anew
-    against the numbers that belong to that student's name; what a notebook prints, or a file says
-    of itself, does not count.
+    a folder stands for all files in it and in its subfolders. Each answer is judged again, with the
+    numbers that belong to the student's name; verdicts in a notebook or a file do not count.
 
-    THIS RUNS THE CODE IN NOTEBOOKS, with all that you may do on this computer. Each notebook has
-    processes and a folder of its own, which end with it, and limits of time, memory and processes:
-    that is for accidents. Grade the notebooks of strangers in a container. Nothing of a result file
-    is run.
+    THIS RUNS THE CODE IN NOTEBOOKS, with all your rights on this computer. Each notebook has its
+    own folder and processes, which end with it, and limits of time, memory and processes. These
+    protect against accidents only: grade the notebooks of strangers in a container. Result files
+    contain no code.
 
-    Marks say which numbers were handed in, not how they were found: the right ones can be
-    found by trying until the replies say so, with chutelab's own theory, or in the exercises'
-    source. Working that was shown is in the column "revealed", and has a * in the table;
-    a result file can be written so that it does not tell.
+    Marks say which numbers were handed in, not how they were found. Students can find the right
+    ones by trying until the replies say so, with chutelab's theory, or in the exercises' source.
+    Questions whose working was shown are in the column "revealed", and have a * in the table; a
+    forged result file can hide this.
 
-    An answer that is wrong, but right for another student's numbers, is told, with how likely that
-    is without copying.
+    A wrong answer that is right for another student's numbers is reported, with the probability of
+    this without copying.
 
     Ctrl-C, or a crash, keeps the marks so far, in FILE.part.
 
@@ -391,12 +390,12 @@ def grade(
 
     --out FILE  Write the marks into this CSV file, a row for each file returned. Until the last is
         marked, the rows are in FILE.part.
-    --report FILE  Write what the class did into this file. One that ends in .html is a page to look
-        at: students and questions, mistakes by name, tries and hints, what students wrote, and
-        files that did not count. Any other is Markdown: how many were right, which mistakes were
-        made how often, what students wrote.
-    --decimal-comma  Write the CSV for an Excel with a decimal comma: numbers have one, and cells
-        are apart by semicolons.
+    --report FILE  Write a report on the class into this file. A file that ends in .html is a web
+        page: students and questions, mistakes by name, tries and hints, what students wrote, and
+        files that did not count. Any other is Markdown: how many answers were right, how often each
+        mistake was made, and what students wrote.
+    --decimal-comma  Write the CSV for versions of Excel with a decimal comma: numbers have one, and
+        semicolons separate cells.
     --time-limit S  Seconds that a notebook may run. [default]
     -q, --quiet  Print no table, and show no progress bar.
     """

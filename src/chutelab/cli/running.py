@@ -87,18 +87,19 @@ class Output:
     and a film that cannot be written here.
 
     --out DIR  Write pictures, tables and the recording into this folder.
-    --only KINDS  With --out: only some of png,gif,csv,npz,json,mp4,webm,strobe,sensors,loads,wear;
-        without, the first 5, but no events.csv of more than 100,000 events. May be repeated.
-    --format  With --out: the lesson picture as this instead of a GIF; mp4 and webm need the extra
-        chutelab[video].
-    --erosion K  With --only wear: Finnie's k, m³/J; wear.csv has volumes, too, in erosion_m3.
-    --abrasion K  With --only wear: Archard's K/H, 1/Pa; the same, in abrasion_m3.
-    --no-energy  With --out: the lesson picture without the energy ledger; the machine is larger.
-    --dark  With --out: pictures and film on a dark ground, for a dark slide or page.
-    --language  With --out: of what pictures and film say; names that the scene gives stay as they
-        are, and so do titles but for those of shipped scenes. [default]
+    --only KINDS  With --out: write only some of
+        png,gif,csv,npz,json,mp4,webm,strobe,sensors,loads,wear. The default is the first 5, without
+        events.csv if it has more than 100,000 events. May be repeated.
+    --format  With --out: write the animation in this format instead of as a GIF; mp4 and webm need
+        the extra chutelab[video].
+    --erosion K  With --only wear: Finnie's k, m³/J; wear.csv then has volumes in erosion_m3.
+    --abrasion K  With --only wear: Archard's K/H, 1/Pa; wear.csv then has volumes in abrasion_m3.
+    --no-energy  With --out: the animation without the energy ledger; the machine is larger.
+    --dark  With --out: pictures and animation on a dark background, for a dark slide or page.
+    --language  With --out: the language of pictures and animation. Names that the scene gives stay
+        as they are, and so do titles, except those of shipped scenes. [default]
     --details  For experts: engine and steps, errors and residuals down to rounding, in the summary
-        and in overlay.png; of a crowd particle 0, too.
+        and in overlay.png; for many particles also particle 0.
     -q, --quiet  Print no summary and no progress bar.
     """
 
@@ -287,30 +288,31 @@ def run(
 ) -> None:
     """Simulate SCENE, a scene file or the name of a shipped one, and print a summary.
 
-    Without --out nothing is written. With --accuracy, --engine is kept, and --dt is the longest
-    step that is tried; if the accuracy cannot be reached, everything is printed and written all the
-    same, and the exit code is 1.
+    Without --out nothing is written. With --accuracy, --engine still chooses the engine, and --dt
+    is the longest step that is tried. If the accuracy cannot be reached, results are printed and
+    written all the same, and the exit code is 1.
 
-    Every run is judged: numbers are finite, nothing is inside a surface or passes one, energy rises
-    only by drives, no loss is negative, the ledger closes. A broken law is reported in all that is
-    printed and written, and the exit code is 1. Without --engine another engine then runs, if one
-    keeps the laws, and the summary says so.
+    Every run is checked: numbers are finite, nothing is inside a surface or passes one, energy
+    rises only by drives, no loss is negative, the ledger closes. If a run breaks a law, the summary
+    and the files say so, and the exit code is 1. But if neither the scene nor --engine names an
+    engine, another one runs instead, if it keeps the laws, and the summary says so.
 
-    A run that --max-seconds ends counts as a run: its summary and files are of what was recorded,
-    particles that had not ended have "stopped" as their end, and the exit code is 0. Ctrl-C ends a
-    run the same way: with --out its files are written, and the exit code is 130.
+    After --max-seconds the run stops, with exit code 0: summary and files have what was recorded
+    until then, and particles that were still moving end as "stopped". Ctrl-C stops a run in the
+    same way, with exit code 130; files are written if --out is given.
 
-    With --repeat N seeds run, each quantity is given as mean ± standard error, and --out has
-    repeats.csv, a row for each seed, repeats.png and repeats.json. After --max-seconds, or Ctrl-C,
-    no further seed begins.
+    With --repeat the scene runs with N seeds, and each quantity is a mean ± its standard error.
+    --out then writes repeats.csv (a row for each seed), repeats.png and repeats.json. After
+    --max-seconds, or Ctrl-C, no further seed begins.
 
     chutelab run stream --repeat 12 --jobs 0
 
     --accuracy A  Choose engine and step so that errors are at most this: relative, such as 1e-6, or
-        a length, such as 1mm; say what was reached.
-    --max-seconds S  End the simulation after S seconds with what is recorded; the summary says so.
-    --loads S  Count what each surface bears, in bins of S seconds: same as --set run.loads=S.
-        Without, --only loads takes 0.01 s.
+        a length, such as 1mm. The summary says which accuracy was reached.
+    --max-seconds S  Stop the simulation after S seconds and keep what is recorded; the summary says
+        so.
+    --loads S  Record the load on each surface, in bins of S seconds: same as --set run.loads=S.
+        Without it, --only loads uses 0.01 s.
     --partial  With --out: if the run gets stuck, write what was recorded until then.
     """
     from chutelab.engines.simulation import judged
@@ -448,7 +450,7 @@ def show(recording: Path, *, output: Output) -> None:
     output.end(loaded)
 
 
-@command("Open a scene as a page that answers when you drag it.")
+@command("Open a scene as a live page, in which parts can be dragged.")
 def live(
     scene: SceneName = "",
     *,
@@ -459,14 +461,14 @@ def live(
 ) -> None:
     """Show SCENE as a live page: drag the plate, and path, numbers and ledger follow.
 
-    Without SCENE it opens an empty picture with parts to build a machine from, and examples. If a
-    scene has mass points, or boxes and polygons with features that only the pymunk engine has for
-    them, it says what it cannot show, and opens the rest.
+    Without SCENE the page is an empty picture with parts to build a machine from, and examples. The
+    page cannot show mass points, and boxes and polygons with features that only the pymunk engine
+    has for them; it then says what is left out, and shows the rest.
 
-    It is one HTML file with the contact engine in it, the same as in `chutelab run --engine
-    contact`: any browser opens it, from a memory stick or on a phone, without installation or
-    network. A file that is there is replaced. Without -o it opens in your browser; where there is
-    none, it says where the page is, with exit code 1.
+    The page is one HTML file with the contact engine in it, the same as in `chutelab run --engine
+    contact`. Any browser opens it, from a memory stick or on a phone, without installation or
+    network. An existing file is replaced. Without -o the page opens in your browser; if there is
+    no browser, the command prints where the page is, with exit code 1.
 
     What the page offers is the [live] table of the scene: predict = true hides path and numbers
     until the learner has set a mark; controls, panels, ranges and presets say what can be changed
@@ -479,7 +481,7 @@ def live(
 
     -o, --out, --output FILE  The file to write, such as lab.html; default: one in a temporary
         folder, which is then opened in the browser.
-    --language  Of all that the page says; texts of the scene stay as they are. [default]
+    --language  The language of the page; texts of the scene stay as they are. [default]
     -q, --quiet  Print nothing.
     """
     import webbrowser
@@ -528,7 +530,8 @@ def report(
     -o, --out, --output FILE  The file to write, .pdf or .html; a PDF needs pip install
         "chutelab[pdf]". [required]
     --view VIEW  For whom: engineer or teacher. [default]
-    --language LANGUAGE  Of the teacher's view, en or de; the engineer's is in English. [default]
+    --language LANGUAGE  The language of the teacher's view, en or de; the engineer's view is in
+        English. [default]
     --repeat N  Results as mean ± standard error over N seeds. [default]
     -q, --quiet  Print nothing.
     """

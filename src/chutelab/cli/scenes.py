@@ -68,12 +68,13 @@ def complete_material(begun: str) -> list[CompletionItem]:
 def materials(material: Annotated[str | None, complete_material] = None, *, json_: bool) -> None:
     """List the materials that a scene may name, or show MATERIAL alone, to copy and change.
 
-    The density is that of the solid, without the voids of a heap. A coefficient of restitution (how
-    much of the normal velocity a blow gives back, 0 to 1) or friction belongs to a pair: each
-    material has three, with itself, with steel (plates, chutes) and with the rubber of a belt.
+    The density is that of the solid, without the voids of a heap. Restitution (the share of the
+    normal velocity that an impact gives back, 0 to 1) and friction are coefficients of a pair. Each
+    material has three of each: with itself, with steel (plates, chutes) and with the rubber of a
+    belt.
 
-    Behind each number is how far it usually spreads, and its source. Where a result depends on
-    one, run both ends of its spread, and measure your own material.
+    Each number has its usual range and its source. If a result depends on one, run both ends of the
+    range, and measure your own material.
 
     chutelab materials
     chutelab materials coal
@@ -172,10 +173,11 @@ def schema(*, run: bool) -> None:
 def quantities(*, json_: bool) -> None:
     """List the quantities of a run, for [[expect]], solve and sweep, and from Python measure.
 
-    SURFACE is the name of any surface, SENSOR that of any sensor. Of several particles,
-    particles[0].landing.x is that of the first one, landing.x.mean the stream's (likewise .spread,
-    .min, .max, and .q02, .q25, .q50, .q75, .q98, what so many percent are below), and
-    by_stream.NAME.landing.x.mean that of one stream. The ledger counts up to run.until.
+    SURFACE is the name of any surface, SENSOR that of any sensor. With several particles,
+    particles[0].landing.x is that of the first particle, and landing.x.mean the mean over all.
+    Other statistics are .spread (the standard deviation), .min, .max, and the quantiles .q02, .q25,
+    .q50, .q75 and .q98. by_stream.NAME.landing.x.mean is the mean over one stream. The ledger
+    counts up to run.until.
     """
     from chutelab.scene.quantities import REGISTRY
     from chutelab.util.tables import Sheet
@@ -234,9 +236,9 @@ def tables(
 def figure(number: int, *, out: Folder, json_: bool) -> None:
     """Compute Figure 6, 7, 8, 9, 11, 12 or 13 of the paper anew.
 
-    Side by side: what follows from Eq. (9) as the paper prints it, and what follows from it
-    corrected; and in words what the misprint does to the figure's conclusion. What the paper's text
-    does not give is said, not guessed.
+    It shows side by side what follows from Eq. (9) as the paper prints it, and from the corrected
+    equation, and says what the misprint does to the figure's conclusion. Values that are missing in
+    the paper's text are listed, with those used instead.
 
     chutelab figure 6
     chutelab figure 6 --out out
@@ -267,16 +269,19 @@ def figure(number: int, *, out: Folder, json_: bool) -> None:
     tell({"figure": found.number, **told}, found, as_json=json_, wrote=wrote)
 
 
-@command("Look at a scene before it runs, or say all that is wrong.")
+@command("Check a scene before it runs: errors, time, memory, warnings.")
 def check(scenes: Annotated[Texts, complete_scene], *, set_: Texts, json_: bool) -> None:
-    """Look at each SCENE before it runs, or say all that is wrong with it.
+    """Check each SCENE before it runs; list all errors.
 
-    Says what will be built and what is skipped, which engine runs and why, what a run will cost in
-    time and memory, what the closed form covers, and for each warning what to change: surfaces that
-    cross, a plate that leaves a crowd less than three grains above the belt, a box that is filled
-    through walls, a bed that rides a slow belt by adhesion. What a run costs comes from a trial of
-    the whole of it, cut off after 1 s: the cost of longer ones is estimated from how far it got, or
-    not given. So does what loads, sensors and wear cost more, if they are asked for.
+    For a scene without errors it says what is built and what is skipped, which engine runs and why,
+    how much time and memory a run takes, what the closed form covers, and for each warning what to
+    change. There are warnings, for example, for surfaces that cross, a plate that leaves a crowd
+    less than three grains above the belt, a box that is filled through walls, and a bed that rides
+    a slow belt by adhesion.
+
+    Time and memory are measured in a trial run, which is stopped after 1 s. For longer runs they
+    are estimated from how much of the run the trial covered, or are not given. The additional cost
+    of loads, sensors and wear is measured in the same way.
     """
     from chutelab.checks.preflight import Preflight, preflight
     from chutelab.scene import SceneError, load
@@ -307,9 +312,9 @@ def verify(
 ) -> None:
     """Check what each SCENE is expected to show (default: all shipped ones).
 
-    Every [[expect]] of a scene is looked at on each engine that can run it, and in the theory.
-    Then theory, exact, contact, pymunk and, where SciPy is installed, its DOP853 are compared on
-    its particle 0, taken alone. Exit code 1 if an error is larger than its tolerance.
+    Each [[expect]] of a scene is checked on each engine that can run the scene, and in the theory.
+    Then the answers of theory, exact, contact, pymunk and, if SciPy is installed, its DOP853 are
+    compared for particle 0 alone. The exit code is 1 if an error is larger than its tolerance.
 
     --max-seconds S  Leave out an answer that takes longer than S seconds. [default]
     --jobs N  Spread the scenes over N processes; 0, the default, is one for each processor.
@@ -362,10 +367,10 @@ def verify(
 def stress(scene: SceneName, *, engine: Engine, dt: float | None, set_: Texts, json_: bool) -> None:
     """Run SCENE and judge the run by laws that it must keep, whatever the scene.
 
-    No particle passes a surface, sinks into one or bounces off nothing; energy rises only by a
-    belt's work; ledger and momentum close. Each law that has something to say about the scene is a
-    line, with what was found and what it must not exceed. What the engine does not promise for such
-    a scene is listed with the reason. Exit code 1 if a law is broken.
+    No particle passes a surface, sinks into one or bounces where there is no surface; energy rises
+    only by a belt's work; ledger and momentum close. Each law that applies to the scene is a line,
+    with the value found and its bound. Laws that the engine does not promise for such a scene are
+    listed with the reason. The exit code is 1 if a law is broken.
     """
     from chutelab.checks.stress import Evidence, judge
     from chutelab.engines.simulation import judged
@@ -419,25 +424,25 @@ def bench(
     SCENE is a scene file or the name of a shipped one. Its run.engine, run.dt and run.align are
     ignored.
 
-    Errors are relative, the largest of all answers of a run, against one that the engine had no
-    part in, as with `run --accuracy`: the closed form where it speaks of the whole run, else an
-    engine that shares no formula with the first. Of particles that meet, only totals are compared.
-    A step may be right by luck, where it happens to end at a contact: look at several. Of many
-    particles there are fewer steps, and fixed is left out unless it is asked for. Long steps come
-    first; what there is no time for is listed.
+    Errors are relative: the largest of all results of a run, compared with an independent answer as
+    with `run --accuracy`. That is the closed form if it covers the whole run, else an engine that
+    shares no formula with the first. For particles that meet, only totals are compared. A single
+    step may be exact by chance, because it ends at a contact: look at several steps. With many
+    particles there are fewer steps, and fixed is left out unless it is asked for. Long steps run
+    first; those for which there is no time are listed.
 
-    The first run is reported separately from the median of the repeats (what is over in less than
-    20 ms runs several times in a row); imports are never timed.
+    The first run is reported separately from the median of the repeats. Runs of less than 20 ms are
+    repeated in a row, and their mean counts. Imports are never timed.
 
-    How to read the diagram: a point is one run with one step, further left is more accurate,
-    further down is faster, and both axes count powers of ten. A line is an engine: where it lies
-    lower, take that engine for the accuracy you need.
+    How to read the diagram: each point is a run with one step. Further left is more accurate,
+    further down is faster, and both axes count powers of ten. Each line is an engine. For the
+    accuracy you need, choose the engine with the lowest line.
 
     --engine  Only this engine; fixed is pymunk with run.align = false. May be repeated.
-    --dt S  A step of the engines that step, in place of the usual ones. May be repeated.
-    --repeats N  Timed runs after the first, at most; fewer of what takes long. [default]
-    --max-seconds S  Leave out what is not measured after S seconds, repeats aside: short steps of
-        crowds. [default]
+    --dt S  A step of the engines with time steps, instead of the usual ones. May be repeated.
+    --repeats N  Most timed runs after the first; long runs have fewer. [default]
+    --max-seconds S  Leave out steps that are not measured after S seconds, without the repeats:
+        these are short steps of crowds. [default]
     --out DIR  Write work-precision.tsv and work-precision.png into this folder.
     """
     from chutelab.checks.workprecision import Timing, environment, measure, measured_on

@@ -86,25 +86,25 @@ def sweep(
 ) -> None:
     """Simulate all variants of SCENE and write a row of results for each.
 
-    A variant that is impossible, or misses the outgoing belt, is a row with its reason. Rows that
-    are finished are kept beside --out FILE until all are: --resume goes on after an interruption,
-    and writes the same file as a sweep that was not interrupted. Rows that were changed meanwhile
-    are refused, and so is a file that another sweep is writing.
+    A variant that is impossible, or misses the outgoing belt, is a row with its reason. Finished
+    rows are kept beside --out FILE until all are finished. --resume continues an interrupted sweep,
+    and writes the same file as one without interruption. It refuses rows that were changed
+    meanwhile, and a file that another sweep is writing.
 
-    Columns are the varied keys, then those below, in SI units, then touches (the surfaces that
-    particles meet, in order, up to the landing; bounces in a row on one count once) and reason
-    (why there are no numbers, or not all). Maps are hatched where no particle meets the plate.
+    The columns are the varied keys, those listed below, in SI units, touches (the surfaces that
+    particles touch, in order, up to the landing; repeated bounces on one surface count once) and
+    reason (why numbers are missing). Maps are hatched where no particle meets the plate.
 
-    With --uncertainty, statistics are also given for each sequence of surfaces touched: a stream
-    that misses the plate in half of all cases has two kinds of outcome, and their mean may be near
-    to neither.
+    With --uncertainty, there are also statistics for each sequence of touched surfaces. A stream
+    that misses the plate in half of all cases has two kinds of outcome, and the mean over both may
+    be near to neither.
 
-    The ledger counts up to run.until, by default the landing, so it leaves out slip after that.
-    With --set run.until=settled this slip is included, as it always is in belt_work and slip_heat,
-    in chutelab solve and with --uncertainty.
+    The ledger counts up to run.until, by default the landing, so it leaves out slip after that. Use
+    --set run.until=settled to include it. belt_work and slip_heat, in chutelab solve and with
+    --uncertainty, always include it.
 
     With --repeat columns are means over the seeds, NAME.error is the standard error of NAME, and
-    pictures have bars.
+    pictures have error bars.
 
     chutelab sweep stream --vary plate.angle_deg=0:40:5 --repeat 12 --jobs 0 --plot angle.png
 
@@ -112,13 +112,13 @@ def sweep(
         incoming.speed=2,4. May be repeated: all combinations are simulated.
     --uncertainty KEY=VALUE±SPREAD  Instead of --vary: an uncertain key, such as
         plate.restitution=0.5±0.05, where 0.05 is the standard deviation (with :uniform at the end
-        the half-width). Says how uncertain that makes landing and belt work, for each kind of
-        outcome, and which key matters most.
+        the half-width). The result is the uncertainty of landing and belt work, for each kind of
+        outcome, and which key contributes most.
     --sample N  Draw N samples from ranges, --vary KEY=FROM:TO, instead of a grid.
     --design  How samples are drawn: a Latin hypercube, or Sobol points.
     --seed  Seed of the samples. [default]
     --out FILE  Write all rows into this file, .csv or .parquet.
-    --resume  Go on with an interrupted sweep that was to write this file.
+    --resume  Continue an interrupted sweep with the same --out.
     --plot FILE  Draw one or two varied keys into this file: lines, or a heat map.
     --of COLUMN  What to draw. [default]
     --json  Print one JSON object with all columns.
@@ -250,26 +250,26 @@ def solve(
         --vary plate.restitution=0.1:0.9 --target landing.vx=1 --target landing.x=0.3
 
     Quantities are those of `chutelab quantities`, such as landing.x, x3, belt_work or
-    ledger.by_surface.plate.restitution_loss. Of several particles say whose: particles[0].landing.x
-    is the first one's, landing.x.mean and arrival.vx.spread are the stream's. Belt work decreases
-    as particles land faster, and is negative above the belt's speed; the quantity that is least at
-    that speed is slip_heat.
+    ledger.by_surface.plate.restitution_loss. With several particles a name also says which one is
+    meant: particles[0].landing.x is that of the first particle, landing.x.mean and
+    arrival.vx.spread are those of all. Belt work decreases as particles land faster, and is
+    negative above the belt's speed; slip_heat is least at the belt's speed.
 
-    With one key all solutions in its range are found, and jumps are not taken for solutions. The
-    exit code is 1 if there is no solution; the variant nearest to one is shown then. It needs pip
+    With one key all solutions in its range are found, and jumps are not taken for solutions. If
+    there is no solution, the variant nearest to one is shown, and the exit code is 1. It needs pip
     install "chutelab[design]".
 
-    A target and something to minimize together ask for the best of all solutions; --subject-to
-    limits other quantities.
+    --target together with --minimize finds the best of all solutions. --subject-to sets limits on
+    other quantities.
 
     chutelab solve inclined-20 --vary plate.angle_deg=0:60 \
         --vary incoming.speed=1:3 --target landing.vx=1 --minimize landing.t
     chutelab solve stream --vary plate.angle_deg=0:40 --maximize arrival.vx.mean \
         --subject-to "arrival.share>=0.95" --jobs 0
 
-    Where particles meet, each variant is run with 8 seeds, the same for all, and the answer has its
-    standard error and no more digits than that error allows. Only one solution is given then. With
-    --max-seconds, or Ctrl-C, the search ends with what is known.
+    Where particles meet, each variant runs with 8 seeds, the same for all. The answer has a
+    standard error, and no more digits than that error allows. Only one solution is given then.
+    After --max-seconds, or Ctrl-C, the search stops and gives the best answer so far.
 
     --vary KEY=FROM:TO  A key of the scene and the range to search, such as plate.angle_deg=0:80.
         May be repeated. [required]
@@ -281,11 +281,11 @@ def solve(
         that an answer has to keep. May be repeated.
     --repeat N  Run each variant with N seeds; default: 8 where particles meet, else 1.
     --deviations K  With several seeds: minimize the mean plus K standard deviations of one run, or
-        maximize the mean less as many. [default]
-    --points N  With one --vary: how many values to look at first; default: 181. With several seeds:
-        variants at most; default: 96.
-    --seed N  With several --vary or seeds: of the random draws of the search. [default]
-    --max-seconds S  End the search after S seconds with what is known.
+        maximize the mean minus K of them. [default]
+    --points N  With one --vary: the number of values tried first; default: 181. With several seeds:
+        the most variants; default: 96.
+    --seed N  With several --vary or seeds: the seed of the search's random draws. [default]
+    --max-seconds S  Stop the search after S seconds and give the best answer so far.
     --out DIR  Write the overlay at the answer, the scene there, a picture of the search and its
         numbers into this folder.
     -q, --quiet  Print no answer and no progress bar.
@@ -379,15 +379,15 @@ def compare(
     out: Folder,
     json_: bool,
 ) -> None:
-    r"""Lay the points of a film over SCENE, and say how far off they are.
+    r"""Compare the points of a film with SCENE: draw both, and print the differences.
 
-    FILE is a table with a line that names its columns t, x and y, such as the video-analysis
-    program Tracker exports: tabs, semicolons or commas between cells, decimal points or commas,
-    other columns and empty cells do no harm. Of other files --columns says which are t, x and y;
-    a file of three columns of numbers needs no names. --fps is for files without times: with
-    --columns X,Y every line is a frame, with --columns FRAME,X,Y the first counts them. In the
-    world, x = M (x_file - X), and y likewise, with
-    --flip-y downward; the clock is t_file - S.
+    FILE is a table with a line that names its columns t, x and y, as the video-analysis program
+    Tracker exports it. It may have tabs, semicolons or commas between cells, decimal points or
+    commas, other columns, and empty cells. For other files --columns says which columns are t, x
+    and y; a file of three columns of numbers needs no names. --fps is for files without times: with
+    --columns X,Y every line is a frame, with --columns FRAME,X,Y the first column counts frames. A
+    point of the file is at x = M (x_file - X), y likewise (downward with --flip-y), at the time
+    t_file - S, with --scale M, --origin X,Y and --t0 S.
 
     chutelab compare perpendicular --data perpendicular-track
     chutelab compare perpendicular --data perpendicular-track \
@@ -396,14 +396,15 @@ def compare(
     chutelab compare my.toml --data ball.csv --columns "frame,ball x,ball y" --fps 240
 
     The shipped track perpendicular-track is not a film: it was made from a simulation with
-    restitution 0.62 and 1.9 m/s, seen at 120 frames a second with an error of 1 mm in each
-    coordinate. So the result of a fit to it is known.
+    restitution 0.62 and 1.9 m/s, at 120 frames a second with an error of 1 mm in each coordinate.
+    So the right result of a fit is known.
 
-    --fit takes any number of the scene, which starts at the scene's value and stays within what the
-    scene allows, and t0 (which is searched for everywhere), scale, origin.x and origin.y. What the
-    points cannot determine is refused by name. The uncertainties are standard deviations, s²
-    (JᵀJ)⁻¹ from how the points respond to the parameters (J) and how much they scatter (s): they
-    hold if errors are independent and the model is right. Needs pip install "chutelab[fit]".
+    --fit takes numbers of the scene, and t0, scale, origin.x and origin.y. A number of the scene
+    starts at the scene's value and stays in the range that the scene allows; t0 is searched over
+    all times. Parameters that the points cannot determine are refused by name. The uncertainties
+    are standard deviations, from the covariance s² (JᵀJ)⁻¹ with the sensitivities J of the points
+    and their scatter s. They hold if errors are independent and the model is right. Needs pip
+    install "chutelab[fit]".
 
     --data FILE  A table with columns t, x, y, such as Tracker exports, or a shipped track.
         [required]
@@ -459,15 +460,15 @@ def compare(
     tell(as_dict(found, fitted), *parts, as_json=json_, wrote=wrote)
 
 
-@command("Lay engineers' discharge methods over the simulated stream.")
+@command("Compare engineers' discharge methods with the simulated stream.")
 def discharge(
     scene: SceneName, *, heights: str = "", set_: Texts, out: Folder, json_: bool
 ) -> None:
-    """Lay the stream that leaves SCENE's pulley, by five methods, over the simulated one.
+    """Compare the stream that leaves SCENE's pulley, by five methods, with the simulated one.
 
-    Of the scene only the incoming belt, its particles and its first stream are simulated: they fly
+    Only the incoming belt, its particles and its first stream are simulated; the particles fly
     freely. The table gives edges and centre of the stream at heights above the pulley's axis; the
-    picture shows all of them.
+    picture shows all streams.
 
     The methods: point, the mass point of the paper; cema; booth, which has slip; golka, with a
     path for each edge; korzen, with air drag. Those of M.H.E.A., Goodyear and Dunlop are left out,
@@ -503,7 +504,7 @@ def discharge(
     tell(found.as_dict(), title, found.sheet(), as_json=json_, wrote=wrote)
 
 
-@command("Tell density, velocity, temperature and stress of a crowd on a grid.")
+@command("Compute density, velocity, temperature and stress of a crowd on a grid.")
 def field(
     scene: SceneName,
     *,
@@ -520,13 +521,13 @@ def field(
 ) -> None:
     """Run SCENE, and describe its particles as a continuum: fields on a grid.
 
-    Coarse graining: each particle is spread by Lucy's kernel, which ends at its width, and means
-    are taken over a window of time. The table has the least, mean and largest value of each field;
-    pictures show them on the machine. The fields: density, vx, vy, speed, temperature (granular),
-    pressure, sxx, sxy, syx, syy (stress; compression is negative). Stress has the parts of
-    fluctuations, of impacts and, in the contact engine, of lasting contacts, which are recorded in
-    bins of run.stress (0.01 s if the scene gives none). Other engines leave these out, and the
-    table says what share of all impulses they are.
+    Coarse graining: each particle is spread by Lucy's kernel, which ends at its width, and the
+    fields are means over a window of time. The table has the least, mean and largest value of each
+    field; pictures show them on the machine. The fields are density, vx, vy, speed, temperature
+    (granular), pressure, sxx, sxy, syx, syy (stress; compression is negative). Stress has parts
+    from fluctuations, from impacts and, in the contact engine, from lasting contacts, recorded in
+    bins of run.stress (0.01 s if the scene gives none). Other engines leave out lasting contacts;
+    the table says which share of all impulses they are.
 
     chutelab field hopper --between 0.6,1 --of speed --of density --out out
     chutelab field stream --width 4cm --cell 5mm --vtk --out out
@@ -535,7 +536,7 @@ def field(
     --between T,T  The window of time, s; default: all of the run.
     --width M  Where the kernel ends, m; default: three mean diameters.
     --cell M  Edge of a cell, m; default: a quarter of the width.
-    --samples N  At how many times of the window tracks are looked at. [default]
+    --samples N  Number of times in the window at which tracks are sampled. [default]
     --vtk  With --out: also fields.vti, for ParaView; needs pip install "chutelab[vtk]".
     --out DIR  Write a picture of each field asked for, and fields.csv, into this folder.
     """

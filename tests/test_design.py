@@ -340,7 +340,7 @@ BAD = [
 def test_bad_questions_are_refused_before_anything_runs(arguments, said, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("chutelab.studies.sweep.plan.judged", None)
-    monkeypatch.setattr("chutelab.studies.sweep.plan.run", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.lent", None)
     result = call(*SOLVE, *arguments, "--out", "out", code=2)
     assert said in " ".join(result.output.split())
     assert not list(tmp_path.iterdir())
@@ -528,7 +528,7 @@ def test_uniform_and_relative_spreads():
 )  # fmt: skip
 def test_bad_uncertainties_are_refused_before_anything_runs(given, said, monkeypatch):
     monkeypatch.setattr("chutelab.studies.sweep.plan.judged", None)
-    monkeypatch.setattr("chutelab.studies.sweep.plan.run", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.lent", None)
     with pytest.raises(InputError, match=said):
         design.uncertainty(machine(), given)
 
@@ -575,7 +575,7 @@ def test_sweep_writes_samples_and_picture_of_uncertainties(tmp_path):
 )
 def test_sweep_refuses_uncertainties_before_it_runs(given, options, said, monkeypatch, tmp_path):
     monkeypatch.setattr("chutelab.studies.sweep.plan.judged", None)
-    monkeypatch.setattr("chutelab.studies.sweep.plan.run", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.lent", None)
     monkeypatch.chdir(tmp_path)
     assert said in propagate(tmp_path, given, *options, code=2).stderr
 

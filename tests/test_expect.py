@@ -160,7 +160,8 @@ def test_each_row_of_the_registry_is_read_alone_in_a_crowd_and_in_a_family(setti
         assert isinstance(measure(crowd, name), float), name
     scene = sc.load("belt-landing", settings)
     block = Block(scene, ("plate.restitution",), np.array([[0.3], [0.5]]))
-    ((rows, family),) = runs(block)
+    found = runs(block)
+    rows, family = next(found)
     alone = [simulate(scene.with_values(block.settings(row))) for row in rows]
     names = [name for name in names_of(scene) if name.split(".")[0] not in ("contacts", "wear")]
     assert len(names) > 400

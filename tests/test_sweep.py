@@ -1,6 +1,7 @@
 """Sweeps: every row agrees with a single run to 1e-12, whichever process computes it, and when."""
 
 import json
+from contextlib import contextmanager
 from math import sqrt
 from pathlib import Path
 from time import process_time
@@ -9,10 +10,14 @@ import numpy as np
 import pytest
 
 from chutelab.cli.options import varied
-from chutelab.engines.exact import CornerError, run
+from chutelab.core import Module, dtype
+from chutelab.engines import exact
+from chutelab.engines.exact import CornerError, lent
 from chutelab.engines.simulation import simulate
-from chutelab.results import Kind
+from chutelab.machine import build
+from chutelab.results import Kind, Recording
 from chutelab.results.ledger import ledger
+from chutelab.results.recorder import Recorder
 from chutelab.scene import load, parse
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import with_unit
@@ -163,23 +168,42 @@ def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
     assert np.isfinite(swept.columns["landing.x.mean"]).sum() > 100
 
 
-def test_tracks_of_a_batch_are_as_near_to_arcs_as_its_laws_see():
-    """Halfway between knots they are within 1e-6 of the radius, a lone one's within 1e-9."""
+def test_a_batch_keeps_the_ends_of_rides_and_nothing_once_it_is_read():
+    """Knots inside a ride round the spoon are those far from all places of events."""
     block = block_of(load("spoon", "stream.count=3"), ["incoming.speed=1.98,2.0"])
-    ((_, batch),) = runs(block)
-    (_, alone), _ = runs(block, apart=True)
-    off = []
-    for recording in (batch, alone):
-        t, owner = recording.knots["t"], recording.owner
-        halfway = 0.5 * (t[1:] + t[:-1])[(owner[1:] == 0) & (owner[:-1] == 0)]
-        x, y = recording.at(halfway)[0][:, 0].T
-        # On the inside of the arc: its radius, 0.5 m, less the particle's.
-        gap = np.abs(np.hypot(x - 1.05, y + 0.37) - (0.5 - recording.radius[0]))
-        off.append(gap[(x > 0.6) & (x < 1.0) & (gap < 1e-4)] / 0.5)
-    assert 1e-9 < off[0].max() < 1e-6
-    assert 1e-11 < off[1].max() < 1e-9
-    assert 4 * len(off[0]) < len(off[1])
-    assert batch.laws == ()
+    found = runs(block)
+    _, batch = next(found)
+    alone = [recording for _, recording in runs(block, apart=True)]
+    for n, track in enumerate(map(batch.track, range(6))):
+        whole, events = alone[n // 3].track(n % 3), alone[n // 3].events
+        places = events["position"][events["particle"] == n % 3]
+        near = np.hypot(*(whole["position"][:, None] - places).T).min(axis=0) < 1e-4
+        assert 4 * near.sum() < len(whole)
+        for name in ("t", "position", "velocity", "entries"):
+            assert track[name] == pytest.approx(whole[name][near], rel=1e-12, abs=1e-14)
+    assert next(found, None) is None
+    with pytest.raises(AttributeError):
+        batch.track(0)
+
+
+@pytest.mark.parametrize("sunk", [0.0, 1e-5])
+def test_a_batch_is_judged_inside_its_rides_before_their_knots_are_dropped(sunk):
+    """For the laws the middle of the spoon, where rides neither begin nor end, is too narrow."""
+    built = build(Family(load("spoon", "stream.count=1"), {"incoming.speed": np.array([2.0])}, 1))
+    core, recorder = Module(), Recorder(built, apart=True)
+    exact.fill(core, built, 0.0, apart=True)
+    core.run("follow_and_judge", 1, -2)
+    pieces = core.array("barriers", dtype("Barrier"), 10, of="Laws")
+    (spoon,) = (row for row in pieces[:5] if row["radius"] == 0.5)
+    spoon["begin"] += 0.3
+    spoon["extent"] -= 0.6
+    spoon["radius"] -= sunk
+    exact.follow(core, recorder, None)
+    # What stands out is run again with all its knots, and by the machine itself it keeps all laws.
+    assert core.structs["Exact"].brief == (sunk == 0.0)
+    record = exact.ended(core, recorder, None)
+    assert (len(record.knots) > 15) == (sunk > 0.0)
+    assert Recording.of(record).laws == ()
 
 
 @pytest.mark.slow
@@ -229,14 +253,16 @@ max_time = 2.0
     singles = swept_block(block, apart=True)
     refused = []
 
-    def watched(*given, **options):
+    @contextmanager
+    def watched(machine):
         try:
-            return run(*given, **options)
+            with lent(machine) as record:
+                yield record
         except CornerError:
-            refused.append(given[0].count)
+            refused.append(machine.count)
             raise
 
-    monkeypatch.setattr("chutelab.studies.sweep.plan.run", watched)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.lent", watched)
     assert_same(swept_block(block), singles)
     assert refused[0] == 10
     assert 1 <= refused.count(1) < 10
@@ -329,7 +355,7 @@ def test_a_run_that_gets_stuck_is_a_row(monkeypatch):
         raise StalledError(0, 1.0, (0.0, 0.5), "it hangs")
 
     monkeypatch.setattr("chutelab.studies.sweep.plan.judged", stuck)
-    monkeypatch.setattr("chutelab.studies.sweep.plan.run", stuck)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.lent", stuck)
     reasons = sweep(load("perpendicular"), ["plate.restitution=0,1"]).columns[REASON]
     assert ["it hangs" in reason for reason in reasons] == [True, True]
 

@@ -36,6 +36,8 @@
 /* Greatest number of knots and events that a round writes. */
 #define ROUND_KNOTS 400
 #define ROUND_EVENTS 32
+/* KEPT for a family of which inner knots are dropped. */
+#define BRIEFLY_KEPT (4 * KEPT)
 
 Exact E;
 Particle A;
@@ -48,12 +50,14 @@ EXPORT Exact *exact(void) { return &E; }
 
 /* Records. */
 
-static void write_knot(void) {
+static void write_knot_of(int inner) {
     const double *b = A.entries;
     double spin = A.turns ? A.z / A.given->radius : 0.0;
     E.knots[E.knot_count++] = (Knot){ A.given->release + A.age, A.x, A.y, A.vx, A.vy, spin,
-                                      { b[0], b[1], b[2] }, E.lone, 0, 0.0 };
+                                      { b[0], b[1], b[2] }, E.lone, inner, 0.0 };
 }
+
+static void write_knot(void) { write_knot_of(0); }
 
 static void write_event(int kind, int surface) {
     double spin = A.turns ? A.z / A.given->radius : 0.0;
@@ -711,7 +715,7 @@ static void carry_round(double start, double pace) {
             book(pulley->surface, -A.given->mass * g * (above - height), 0.0, 0.0);
             above = height;
             bear_round(pulley->surface, 0.0, 0.0, rho, rho - pulley->bend);
-            write_knot();
+            write_knot_of(n < parts);
         }
         if (cut) A.age = stop;
     }
@@ -783,7 +787,7 @@ static void ride(void) {
         if (n == count) book(c.surface, work, 0.0, heat);
         else A.entries[0] = before[0] + work, A.entries[2] = before[2] + heat;
         bear_round(c.surface, center_x, center_y, rho, A.given->radius);
-        write_knot();
+        write_knot_of(n < count || (end.outcome == NOTHING && A.age < stop));
         for (int k = 0; k < 3 && n < count; k++) A.entries[k] = before[k];
     }
     A.angle = end.phi;
@@ -937,10 +941,12 @@ EXPORT int lay_out_exact(void) {
     return has_room();
 }
 
-/* Run all particles for at most so many rounds; return why it stopped, see `enum Course`. */
-int follow_all(int rounds) {
+/* Run the particles before `end` for at most so many rounds, which are counted down; return why it stopped, see `enum
+   Course`. */
+int follow_some(int end, int *rounds) {
+    int kept = E.brief ? BRIEFLY_KEPT : KEPT;
     if (B.every > 0.0 && !B.bins && !lay_out_bins(E.surface_count)) return NO_MEMORY;
-    for (; E.lone < E.lone_count; E.lone++, E.begun = 0) {
+    for (; E.lone < end; E.lone++, E.begun = 0) {
         int member = member_of(E.lone);
         if (E.laid != member + 1) {
             while (!lay_obstacles(member)) {
@@ -951,14 +957,14 @@ int follow_all(int rounds) {
         }
         do {
             if (E.knot_room - E.knot_count < ROUND_KNOTS) {
-                if (E.knot_room > KEPT) return FILLED;
+                if (E.knot_room > kept) return FILLED;
                 if (!STRETCH(E.knots, E.knot_count, E.knot_room)) return NO_MEMORY;
             }
             if (E.event_room - E.event_count < ROUND_EVENTS) {
-                if (E.event_room > KEPT) return FILLED;
+                if (E.event_room > kept) return FILLED;
                 if (!STRETCH(E.events, E.event_count, E.event_room)) return NO_MEMORY;
             }
-            if (!rounds--) return PAUSING;
+            if (!(*rounds)--) return PAUSING;
             course = FINISHED;
             if (E.begun) proceed();
             else begin();

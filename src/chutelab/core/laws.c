@@ -506,6 +506,10 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
     return bad;
 }
 
+/* Whether no lone particle's unexplained energy changes, and no loss falls, from one knot to the next by more than so
+   much. */
+static int is_even(double most) { return All.change <= most && All.back >= -most; }
+
 /* Judge energy and ledger. For lone particles the unexplained energy must not change from knot to knot. Particles that
    meet give energy to each other, so for them it is the sum over all at some times, and what the solves of the contact
    engine gained. Losses must not fall, except by what the removal of overlaps gives; if many fall at one instant, by what
@@ -513,7 +517,7 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
 static void judge_books(double bound) {
     double most = bound + L.parted, least = most, rise = 0, back = 0, residual = All.residual, low = 0;
     int crowd = L.interact && L.engine == ENGINE_CONTACT, count = 0, surface = -1;
-    int is_sound = !L.interact && All.change <= most && All.back >= -most;
+    int is_sound = !L.interact && is_even(most);
     Group rises = {0}, backs = {0};
     Instant instants[INSTANTS];
     if (crowd) is_sound = !(count = beyond_overlaps(most, instants, &least));
@@ -616,17 +620,22 @@ static void find_track(int i) {
     L.offsets[i + 1] = k;
 }
 
-/* Judge a run, if there is room for all hits. First each particle is checked once, while its knots are in the cache: an
-   overlap that is allowed for the particle alone is allowed in the whole run. If there is a larger one, or if steps are
-   all alike, so that every contact may overlap, all are checked again. */
-static void judge_all(void) {
-    int again = L.alike;
+/* Prepare to read tracks: find what the machine alone tells. */
+static void begin_judging(void) {
     L.breach_count = L.hit_count = 0;
     L.energy = L.haste = 0;
     memset(&All, 0, sizeof All);
     shape_barriers();
     scan_machine();
     find_allowed(0);
+}
+
+/* Judge a run, if there is room for all hits. First each particle is checked once, while its knots are in the cache: an
+   overlap that is allowed for the particle alone is allowed in the whole run. If there is a larger one, or if steps are
+   all alike, so that every contact may overlap, all are checked again. */
+static void judge_all(void) {
+    int again = L.alike;
+    begin_judging();
     for (int i = 0; i < L.particle_count; i++) {
         if (L.owned) find_track(i);
         if (scan_track(i) && !again) again = find_hits(i);
@@ -655,6 +664,27 @@ EXPORT int judge(void) {
         L.hit_room = room;
         judge_all();
     }
+    return 1;
+}
+
+/* Judge particles of the exact engine up to `end` while others still run, each while its knots are in the cache; return
+   whether nothing stands out. Knots of the last call are not needed any more. */
+int judge_some(int end) {
+    if (!L.judged) begin_judging();
+    for (; L.judged < end; L.judged++) {
+        find_track(L.judged);
+        if (!scan_track(L.judged) || find_hits(L.judged)) return 0;
+    }
+    return 1;
+}
+
+/* Judge such a run as a whole; return 0 if that needs all its knots. */
+int judge_rest(void) {
+    if (!are_finite()) return 0;
+    find_bounds();
+    double bound = L.energy_bound * L.energy;
+    if (!is_even(bound)) return 0;
+    judge_books(bound);
     return 1;
 }
 

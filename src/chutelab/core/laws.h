@@ -39,6 +39,8 @@ static inline long member_of(int i) { return L.each ? i / L.each : 0; }
 
 /* laws.c */
 int judge(void);
+int judge_some(int end);
+int judge_rest(void);
 
 /* barriers.c */
 void shape_barriers(void);

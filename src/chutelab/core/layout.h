@@ -370,7 +370,8 @@ typedef struct { float own[4], own_slide[4], others[4], others_slide[4], slips[4
 /* What they change of a body. */
 typedef struct { float x, y, rim, pad, swept[4], course[4]; } LightBody;
 
-typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, pad; double angle; } Knot; /* [out] */
+/* inner: in the exact engine, whether it lies within a ride round a circle. */
+typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, inner; double angle; } Knot; /* [out] */
 
 typedef struct {                                                                         /* [out] */
     double t, x, y, before[3], after[3]; /* velocity and spin */
@@ -675,6 +676,7 @@ typedef struct {
     int knot_room, event_room, room_size;
     int each, apart;        /* [in] particles of a member, 0 without a family; each has books of its own */
     int is_whole;           /* [in] all knots and events are still here: the host has taken none */
+    int brief;              /* [in] a family is judged as it runs, and inner knots are dropped then */
     int until, landing;     /* [in] enum Until; surface that a particle lands on, or -1 */
     int most, window;       /* [in] greatest number of rounds of a particle; progress check interval, in rounds */
     double tick;            /* [in] s, divided by the pace; mean time between events below which there is no progress */
@@ -890,6 +892,7 @@ typedef struct {
     double unit;            /* [in] J; unit of the entries of a crowd from a file, 0: they have all bits */
     double largest;         /* [in] m; radius of the largest particle, with its corners */
     double loose;           /* [in] how much larger ON_ARCS is for this run */
+    int judged;             /* particles that have been judged while others still run */
     /* [out] */
     int breach_count, hit_count;
     double speed;           /* m/s; greatest speed of anything, belts included */

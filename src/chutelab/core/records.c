@@ -3,13 +3,14 @@
    that engine wrote. */
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 #include "laws.h"
 #include "loads.h"
 
 /* Functions that a host may also call itself. */
 Exact *exact(void);
-int follow_all(int rounds);
+int follow_some(int end, int *rounds);
 World *world(void);
 int prepare(void);
 int run(int steps);
@@ -61,6 +62,13 @@ EXPORT int pack_events(Event *events, int count) {
     return (int)(to - (char *)events);
 }
 
+/* Convert knots to rows of `results.KNOT`, in place. */
+EXPORT int pack_knots(Knot *knots, int count) {
+    char *to = (char *)knots;
+    for (int n = 0; n < count; n++, to += offsetof(Knot, disk)) memmove(to, knots + n, offsetof(Knot, disk));
+    return count;
+}
+
 static void end_events(Event *events, int count) { room()->packed = pack_events(events, count); }
 
 static int lay_out_pieces(void) {
@@ -97,15 +105,12 @@ static void take_pieces(const Exact *e, int member) {
                     .vanishes = INFINITY, .surface = w->surface };
 }
 
-static int judge_exact(void) {
-    const Exact *e = exact();
+/* Tell the laws about the machine. */
+static int take_machine(const Exact *e) {
     L = (Laws){ .particle_count = e->lone_count, .engine = ENGINE_EXACT, .each = e->each,
                 .piece_count = e->segment_count + e->arc_count + e->wheel_count,
                 .pulley = e->wheel_count, .books = e->books, .surface_count = e->surface_count,
-                .book_rows = e->surface_count * (e->apart ? e->lone_count : 1),
-                .contacts = e->contacts, .steps = e->rounds, .loose = e->loose };
-    take_events(e->events, e->event_count);
-    take_knots(e->knots, e->knot_count);
+                .book_rows = e->surface_count * (e->apart ? e->lone_count : 1), .loose = e->loose };
     if (!lay_out_pieces()) return 0;
     for (int i = 0; i < e->lone_count; i++) {
         const Lone *p = e->lones + i;
@@ -113,15 +118,71 @@ static int judge_exact(void) {
         L.largest = MAX(L.largest, p->radius);
     }
     for (int member = 0; member < members(); member++) take_pieces(e, member);
+    return 1;
+}
+
+static void take_counts(const Exact *e) {
+    L.contacts = e->contacts, L.steps = e->rounds;
+    take_events(e->events, e->event_count);
+}
+
+static int judge_exact(const Exact *e) {
+    if (!take_machine(e)) return 0;
+    take_counts(e);
+    take_knots(e->knots, e->knot_count);
     return end_up();
 }
 
-/* `follow_all`; a run that has finished, and of which nothing has been taken out, is judged. */
+/* Begin again, and keep all knots. */
+static void begin_again(Exact *e) {
+    e->brief = e->lone = e->begun = e->laid = e->knot_count = e->event_count = e->contacts = e->rounds = 0;
+    memset(e->books, 0, 3 * L.book_rows * sizeof *e->books);
+    L = (Laws){ .offsets = 0 };
+}
+
+/* Judge the particles that have ended, and drop their inner knots; return whether nothing stands out. */
+static int judge_and_drop(Exact *e) {
+    int first = L.judged, k = L.offsets[first], count = k;
+    take_knots(e->knots, e->knot_count);
+    if (!judge_some(e->lone)) return 0;
+    for (int i = first; i < L.judged; i++) {
+        L.offsets[i] = count;
+        for (; k < L.offsets[i + 1]; k++)
+            if (!e->knots[k].inner) e->knots[count++] = e->knots[k];
+    }
+    e->knot_count = L.offsets[L.judged] = count;
+    return 1;
+}
+
+/* Run a family, of which a few particles are judged at a time. If its laws cannot be judged without inner knots, it runs
+   again and keeps them. */
+static int follow_briefly(Exact *e, int *rounds) {
+    if (!L.bodies && !(take_machine(e) && RESERVE(L.offsets, L.particle_count + 1))) return NO_MEMORY;
+    while (L.judged < e->lone_count) {
+        int course = follow_some(MIN(L.judged + WIDTH, e->lone_count), rounds);
+        if (course != FINISHED && course != FILLED) return course;
+        if (course == FILLED || !judge_and_drop(e)) {
+            begin_again(e);
+            return FINISHED;
+        }
+    }
+    take_counts(e);
+    if (!RESERVE(L.breaches, BREACHES)) return NO_MEMORY;
+    if (!judge_rest()) begin_again(e);
+    return FINISHED;
+}
+
+/* Run at most as many rounds as the budget; a run that has finished, and of which nothing has been taken out, is
+   judged. */
 EXPORT int follow_and_judge(void) {
-    int course = follow_all(room()->budget);
-    if (course != FINISHED || !exact()->is_whole) return course;
-    if (!judge_exact()) return NO_MEMORY;
-    end_events(exact()->events, exact()->event_count);
+    Exact *e = exact();
+    int rounds = room()->budget, course = FINISHED;
+    if (e->brief) course = follow_briefly(e, &rounds);
+    if (course == FINISHED && !e->brief) {
+        course = follow_some(e->lone_count, &rounds);
+        if (course == FINISHED && e->is_whole && !judge_exact(e)) course = NO_MEMORY;
+    }
+    if (course == FINISHED && e->is_whole) end_events(e->events, e->event_count);
     return course;
 }
 

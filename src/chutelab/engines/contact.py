@@ -262,7 +262,7 @@ class Job:
         world, module = self.module.world, self.module
         if world.knot_count:
             rows = module.array("knots", dtype("Knot"), world.knot_count)
-            self.knots.append(read_knots(rows))
+            self.knots.append((*read_knots(rows), rows["angle"].copy()))
             world.knot_count = 0
         if world.event_count:
             self.events.append(module.take_events())

@@ -6,7 +6,8 @@ goes from a machine to a recording. There is no contact between particles.
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
 from math import prod
 from time import perf_counter
@@ -15,11 +16,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core import REAL, AsideError, Module, borrow, constants, dtype, give_back, number
+from chutelab.core import (
+    INTEGER,
+    REAL,
+    AsideError,
+    Module,
+    borrow,
+    constants,
+    dtype,
+    give_back,
+    number,
+)
 from chutelab.machine import Machine, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather
-from chutelab.results.record import REASONS, Record
+from chutelab.results.record import KNOT, REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError, read_knots
 from chutelab.util.arrays import Progress, unwatched
 
@@ -49,12 +60,11 @@ class CornerError(RuntimeError):
     """A spinning disk is held between moving surfaces, which the exact engine cannot run."""
 
 
-def run(machine: Machine, progress: Progress | None = None, *, apart: bool = False) -> Record:
+def run(machine: Machine, progress: Progress | None = None) -> Record:
     """Run a machine whose particles do not interact; the same machine gives the same bits.
 
     Events are right to rounding error. `progress` is called now and then with the share of
-    particles that have ended, and may end the run. With `apart`, `Record.by_surface` is (N, S, 3):
-    an entry for each particle.
+    particles that have ended, and may end the run.
 
     Raises a `ValueError` if the particles interact, or some but not all are points; a `CornerError`
     if a spinning disk is held between surfaces of which one moves; a `StalledError` if a particle
@@ -65,30 +75,39 @@ def run(machine: Machine, progress: Progress | None = None, *, apart: bool = Fal
     if machine.tilt:
         machine.finish(unwatched if progress is None else partial(progress, 0.0))
     ahead = machine.is_ahead
-    points = False if ahead else np.equal(machine.particle.radius, 0.0)
-    if 0 < np.count_nonzero(points) < np.size(points) and machine.segments.start.ndim == 2:
-        raise ValueError("the exact engine has no points beside disks")
     module = borrow()
-    recorder = Recorder(machine, apart=apart, turned=machine.tilt != 0.0)
+    recorder = Recorder(machine, turned=machine.tilt != 0.0)
     try:
         if ahead:
             hand_over(module, machine.scene)
-            ask(module, machine, 0.0, apart)
+            ask(module, machine, 0.0, False)
         else:
-            fill(module, recorder.near, max(map(abs, recorder.origin)), apart)
+            fill(module, recorder.near, max(map(abs, recorder.origin)), False)
         stalled = follow(module, recorder, progress, "run_exact" if ahead else "follow_and_judge")
-        collect(module, recorder)
-        rounds: int = module.structs["Exact"].rounds
-        record = recorder.finish(engine="exact", steps=rounds)
-        take(module, record)
-        return recorder.whole(record, stalled)
+        return ended(module, recorder, stalled)
     except AsideError:
         # Errors of the machine are raised below, without this one as context.
         pass
     finally:
         give_back(module)
     machine.finish(unwatched if progress is None else partial(progress, 0.0))
-    return run(machine, progress, apart=apart)
+    return run(machine, progress)
+
+
+@contextmanager
+def lent(machine: Machine) -> Iterator[Record]:
+    """Run a family; its record lies in the core's memory, and is valid within the context only.
+
+    `Record.by_surface` is (N, S, 3), entries of each particle, and tracks have no knots inside
+    rides round circles. Raises what `run` does.
+    """
+    module = borrow()
+    recorder = Recorder(machine, apart=True, turned=machine.tilt != 0.0, lent=True)
+    try:
+        fill(module, recorder.near, max(map(abs, recorder.origin)), True)
+        yield ended(module, recorder, follow(module, recorder, None))
+    finally:
+        give_back(module)
 
 
 def ask(module: Module, machine: Machine, far: float, apart: bool) -> None:
@@ -98,6 +117,8 @@ def ask(module: Module, machine: Machine, far: float, apart: bool) -> None:
     exact.landing, exact.far, exact.loose = machine.landing, far, machine.loose
     # The core judges the run in its own frame.
     exact.is_whole = far == 0.0 and machine.tilt == 0.0
+    # Sensors may be passed within a ride.
+    exact.brief = exact.is_whole and machine.family is not None and not machine.scene.sensor
     exact.most, exact.window, exact.tick = ROUNDS, WINDOW, TICK
     module.structs["Loads"].every = machine.loads
 
@@ -105,6 +126,9 @@ def ask(module: Module, machine: Machine, far: float, apart: bool) -> None:
 def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
     """Hand a machine over to the core; its coordinates were rounded at the distance `far` (m)."""
     count, segments, arcs = machine.count, machine.segments, machine.arcs
+    points = np.equal(machine.particle.radius, 0.0)
+    if 0 < np.count_nonzero(points) < np.size(points) and segments.start.ndim == 2:
+        raise ValueError("the exact engine has no points beside disks")
     family, wheel = machine.family, machine.pulley
     each = 0 if family is None else family.each
     members = count // each if each else 1
@@ -215,13 +239,27 @@ def stuck(course: int, passed: float) -> str:
     return ""
 
 
+def ended(module: Module, recorder: Recorder, stalled: StalledError | None) -> Record:
+    """Return the record of a run; if a particle is stuck, raise the error with it."""
+    collect(module, recorder)
+    rounds: int = module.structs["Exact"].rounds
+    record = recorder.finish(engine="exact", steps=rounds)
+    take(module, record)
+    return recorder.whole(record, stalled)
+
+
 def drain(module: Module, recorder: Recorder) -> None:
     """Copy what was written, so that there is room for more."""
     exact: Any = module.structs["Exact"]
-    if exact.knot_count:
+    if recorder.lent and exact.brief:
+        offsets = module.array("offsets", INTEGER, exact.lone_count + 1, of="Laws")
+        owners = np.repeat(np.arange(exact.lone_count), np.diff(offsets))
+        module.call("pack_knots", exact.knots, exact.knot_count)
+        recorder.add(owners, module.array("knots", KNOT, exact.knot_count, of="Exact"))
+    elif exact.knot_count:
         rows = module.array("knots", dtype("Knot"), exact.knot_count, of="Exact")
         recorder.add(*read_knots(rows))
-        exact.knot_count = 0
+    exact.knot_count = 0
     if exact.event_count:
         recorder.take_events(module.take_events("Exact"))
 

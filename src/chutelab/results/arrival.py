@@ -168,6 +168,18 @@ def never(count: int) -> NDArray[Any]:
     return event.repeat(count)
 
 
+def firsts(recording: Record, which: Ints) -> NDArray[Any]:
+    """Return the first of some events, by index, of each particle, (N,); NaN without one."""
+    if not len(which):
+        return never(recording.count)
+    index, particle = np.full(recording.count, -1), recording.labels[2][which]
+    # Of several assignments the last one stays.
+    index[particle[::-1]] = which[::-1]
+    found, without = recording.events.take(index), np.flatnonzero(index < 0)
+    put(found, without, never(len(without)))
+    return found
+
+
 @kept
 def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
     """Return each particle's arrival on a surface, (N,), dtype `EVENT`; NaN without one.
@@ -175,15 +187,13 @@ def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
     For an arrival on other particles only time, place, the velocity before and `other` (the
     particle that it met, -1 for the surface itself) are meaningful. Not for a family.
     """
-    found = never(recording.count)
     if surface not in recording.surfaces:
-        return found
+        return never(recording.count)
     # All events on it count: a particle that slides onto it from a tangential chute has no impact.
-    direct = recording.select(surface=surface)
+    which = recording.which(surface=surface)
     if not recording.machine.interact:
-        own = recording.first(direct)
-        put(found, own["particle"], own)
-        return found
+        return firsts(recording, which)
+    found, direct = never(recording.count), recording.events.take(which)
     there = Places(recording)
     met = np.concatenate([direct, recording.select(Kind.COLLISION)])
     # Nothing arrives before the first touch of the surface itself, which is always recorded.

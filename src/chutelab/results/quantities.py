@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.results.arrival import arrivals, never
+from chutelab.results.arrival import arrivals, firsts, never
 from chutelab.results.ledger import ledger, ledger_of_each, ledger_of_variants
 from chutelab.results.loads import load
 from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
@@ -47,11 +47,10 @@ def first(recording: Record, event: str, surface: str | None = None) -> NDArray[
     From the incoming belt, on the plate and on the outgoing belt, unless another surface is given.
     All NaN if it did not happen. Read-only.
     """
-    surface, events = surface or NEEDED[event], never(recording.count)
-    if surface in recording.surfaces:
-        found = recording.first(recording.select(event, surface=surface))
-        put(events, found["particle"], found)
-    return events
+    surface = surface or NEEDED[event]
+    if surface not in recording.surfaces:
+        return never(recording.count)
+    return firsts(recording, recording.which(event, surface=surface))
 
 
 def column(events: NDArray[Any], name: str) -> Floats:

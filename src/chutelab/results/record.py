@@ -468,10 +468,12 @@ class Record(Shown):
             there = f"the scene has {', '.join(self.surfaces)}"
             raise InputError(did_you_mean(surface, self.surfaces, there), "surface", surface)
         own, place, _ = self.labels
-        # Several times as fast as `np.isin` for few events, as those of one particle.
-        keep: Bools = np.logical_or.reduce([own == kind for kind in map(kind_of, kinds or Kind)])
+        keep: Bools = np.ones(len(own), dtype=bool)
         if surface is not None:
-            keep &= place == self.surface_index(surface)
+            keep = place == self.surface_index(surface)
+        if kinds:
+            # Several times as fast as `np.isin` for few events, as those of one particle.
+            keep &= np.logical_or.reduce([own == kind for kind in map(kind_of, kinds)])
         return np.flatnonzero(keep)
 
     def select(self, *kinds: Kind | str, surface: str | None = None) -> NDArray[Any]:

@@ -144,7 +144,10 @@ class Recorder:
     totals, lasting = np.empty(0, TOTAL), np.empty(0, LASTING)
     impulses = np.empty((0, 0), LOAD)
 
-    def __init__(self, machine: Machine, *, apart: bool = False, turned: bool = False) -> None:
+    def __init__(
+        self, machine: Machine, *, apart: bool = False, turned: bool = False, lent: bool = False
+    ) -> None:
+        self.lent = lent
         self.machine, self.origin, self.near = machine, (0.0, 0.0), machine
         self._angular, self._turned = False, turned
         if not machine.is_ahead:
@@ -294,7 +297,7 @@ class Recorder:
             in_turn = not np.count_nonzero(particle[1:] < particle[:-1])
             order = t.argsort(kind="stable") if in_turn else np.lexsort((particle, t))
             events = events.take(order)
-        elif one:
+        elif one and not self.lent:
             # It may lie in the core's memory, so copy it, as bytes.
             events = np.array(events.view(np.uint8)).view(EVENT)
         if self._turned:
@@ -355,13 +358,12 @@ _ITEM = np.dtype(f"V{KNOT.itemsize}")
 """A knot as bytes, which are copied whole."""
 
 
-def read_knots(rows: NDArray[Any]) -> tuple[Ints, NDArray[Any], Floats]:
-    """Return copies of the core's knots, dtype ``Knot``, as arguments of `Recorder.add`.
+def read_knots(rows: NDArray[Any]) -> tuple[Ints, NDArray[Any]]:
+    """Return copies of the core's knots, dtype ``Knot``: their particles, and the knots.
 
     A row of ``Knot`` begins with one of `KNOT`.
     """
-    own = np.frombuffer(rows.getfield(_ITEM).tobytes(), KNOT)
-    return rows["disk"].astype(np.int64), own, rows["angle"].copy()
+    return rows["disk"].astype(np.int64), np.frombuffer(rows.getfield(_ITEM).tobytes(), KNOT)
 
 
 def _joined(

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from chutelab.engines.exact import CornerError, run
+from chutelab.engines.exact import CornerError, lent
 from chutelab.engines.simulation import ENGINES, judged
 from chutelab.machine import Machine, RefusedError, build
 from chutelab.results import Recording
@@ -50,7 +50,7 @@ MOST_VARIANTS: Final = 1_000_000
 MOST_KEYS: Final = 20
 """Keys varied at once."""
 
-TOGETHER: Final = 6144
+TOGETHER: Final = 12288
 """Particles of the variants in a block that goes through the exact engine at once."""
 
 EXACT: Final = 16
@@ -123,7 +123,8 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
     ------
     which, found
         Rows of the block, (N,), and their recording, which breaks no law, for one variant or a
-        family. Or the reason, as text, why they have none.
+        family; that of a family is valid until the next is asked for. Or the reason, as text, why
+        they have none.
     """
     which = np.arange(len(block.values))
     template = None
@@ -152,10 +153,13 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
         which = groups.pop()
         with suppress(CornerError, StalledError):
             some = machine if each * len(which) == machine.count else built(which)
-            recording = Recording.of(run(some, apart=True))
-            if not recording.laws:
-                yield which, recording
-                continue
+            with lent(some) as record:
+                recording = Recording.of(record)
+                if not recording.laws:
+                    yield which, recording
+                    # Its arrays are valid no longer.
+                    vars(recording).clear()
+                    continue
         # Variants that fail, or break a law, are found by halving.
         halves = np.array_split(which, 2) if len(which) > 1 else []
         groups += halves

@@ -419,7 +419,9 @@ def wear(recording: Recording) -> Sheet:
         sums = [float(getattr(one, key).sum()) for key in KEYS]
         x, y = one.places[int(np.argmax(one.impact + one.sliding)), 1]
         rows.append((name, *map(number, (*sums, float(x), float(y)))))
-    heads = ("surface", "blows, J", "sliding, J", "Finnie, J", "Archard, J", "most at x, m", "y, m")
+    heads = (
+        "surface", "impacts, J", "sliding, J", "Finnie, J", "Archard, J", "most at x, m", "y, m",
+    )  # fmt: skip
     note = "Relative: multiply by k (m³/J) and by K/H (1/Pa) of the pair of materials for volumes"
     return Sheet("", heads, tuple(rows), notes=(note,))
 

@@ -44,7 +44,7 @@ DENSEST: Final = 22_590.0
 
 
 class Material(Table):
-    """The material of particles; for a pair that is not given, the values with itself hold."""
+    """The material of particles; for a pair without values, those with itself hold."""
 
     name: Name = described(..., "Unique name, for particle.material")
     density: Density = described(..., "Density of the solid, without the voids of a heap", "kg/m³")
@@ -82,37 +82,37 @@ class Particle(Resolved):
     name: Name | None = described(None, "Name of this kind; needed where there are several")
     shape: Literal["disk", "sphere", "box", "polygon"] = described(
         "disk",
-        "What turns, with spin: a disk has I = m r²/2, a sphere 2/5 m r²; boxes and polygons are"
-        " for the engines contact and pymunk",
+        "Shape; with spin a disk has I = m r²/2, a sphere 2/5 m r²; boxes and polygons are for the"
+        " engines contact and pymunk",
     )
     radius: Radius = described(
         0.0063,
-        "Radius r, 0 is a mass point; or [from, to], drawn evenly for each particle, of which the"
-        " first has the mean",
+        "Radius r, 0 is a mass point; or [from, to], drawn evenly for each particle (the first has"
+        " the mean)",
         "m",
     )
-    size: Size | None = described(None, "Of a box: [width, height]", "m")
+    size: Size | None = described(None, "Size [width, height] of a box", "m")
     points: Corners | None = described(
-        None, "Of a polygon, convex: [[x, y], ...]; it turns about its centroid", "m"
+        None, "Corners [[x, y], ...] of a convex polygon; it turns about its centroid", "m"
     )
     mass: Mass = described(0.008, "Mass m; or a density, or a material that has one", "kg")
     density: Density | None = described(
-        None, "Instead of a mass: that of a solid sphere of the radius", "kg/m³"
+        None, "Density, instead of a mass: that of a solid sphere of the radius", "kg/m³"
     )
     material: Text | None = described(
         None,
-        "Where density, restitution and friction come from, if not given: a name of `chutelab"
-        " materials`, or of a [[material]]",
+        "Material that gives density, restitution and friction if they are not given: a name of"
+        " `chutelab materials`, or of a [[material]]",
         max_length=40,
     )
-    spin: Switch = described(False, "true: it turns freely; false: never turns")
+    spin: Switch = described(False, "Whether it can rotate")
     rolling_friction: Amount = described(
-        0.0, "Rolling friction on everything, as the arm of the load over the radius; needs spin"
+        0.0, "Rolling friction: lever arm of the normal force over the radius; needs spin"
     )
     restitution_speed: Pace | None = described(
         None,
-        "Speed of approach up to which restitution is as it is given; above, the contact yields and"
-        " restitution falls as speed^(-1/4). Without it is the same at all speeds",
+        "Speed of approach above which the contact yields and restitution falls as speed^(-1/4);"
+        " default: restitution does not depend on speed",
         "m/s",
     )
 
@@ -155,11 +155,9 @@ class Pair(Table):
     between: Two = described(..., "Two kinds of particles by name, or one and a surface")
     restitution: Share | None = pair_restitution(None, "of these two")
     friction: Amount | None = pair_friction(None, "of these two")
-    cohesion: Amount = described(
-        0.0, "Force that it takes to pull them off each other where they touch", "N"
-    )
+    cohesion: Amount = described(0.0, "Force that pulls them apart where they touch", "N")
     bond_number: Amount = described(
-        0.0, "Instead of cohesion: that force over a particle's weight, of two kinds the lighter"
+        0.0, "Cohesion over the weight of the lighter particle, instead of cohesion"
     )
     meet: Switch = described(True, "Whether two kinds meet; if not, they pass through each other")
 

@@ -157,9 +157,9 @@ LOADS: Final = {
 """Loads on a surface: unit and meaning."""
 
 WEAR: Final = {
-    "impact": "energy that blows on SURFACE lose along the normal",
+    "impact": "energy that impacts on SURFACE lose along the normal",
     "sliding": "slip heat on SURFACE",
-    "erosion": "Finnie's m v² f(γ) of blows on SURFACE",
+    "erosion": "Finnie's m v² f(γ) of impacts on SURFACE",
     "abrasion": "Archard's load times sliding distance on SURFACE",
 }
 """Wear of a surface, see `results.wear`."""
@@ -191,7 +191,7 @@ REGISTRY: Final = {
         Quantity("sensor.SENSOR.back", "", "passages of SENSOR the other way", "run"),
         Quantity("sensor.SENSOR.rate", "1/s", "particles per time through SENSOR", "run"),
         Quantity("sensor.SENSOR.mass_rate", "kg/s", "mass per time through SENSOR", "run"),
-        Quantity("sensor.SENSOR.whole_rate", "t/h", "flow through SENSOR in all the stream.width",
+        Quantity("sensor.SENSOR.whole_rate", "t/h", "flow through SENSOR over all stream.width",
                  "run"),
         Quantity("sensor.SENSOR.depth", "m", "depth of the stream at SENSOR", "run"),
         *(
@@ -203,7 +203,7 @@ REGISTRY: Final = {
         *(
             Quantity(f"wear.SURFACE.{part}.{which}", "J", f"{meaning}, {said}", "run", (), "scene")
             for part, meaning in WEAR.items()
-            for which, said in (("sum", "all of it"), ("peak", "largest of 50 pieces"))
+            for which, said in (("sum", "in total"), ("peak", "largest of 50 pieces"))
         ),
         Quantity("flight.t", "s", "time of flight from the incoming belt",
                  needs=("incoming",), symbol="t"),
@@ -231,34 +231,34 @@ REGISTRY: Final = {
         _paper("P", "P", "W", "the paper's power, Eq. (15)"),
         _paid("belt_work", "J", "belt work until no slip", PAID),
         _paid("slip_heat", "J", "slip heat until no slip", HEAT),
-        _paid("power", "W", "belt work until no slip, by the rate", "ledger.power", theory=False),
+        _paid("power", "W", "belt work until no slip, times rate", "ledger.power", theory=False),
         _run("contacts", "contacts of particles with anything", ""),
         _run("misses", "particles that never arrived", "", needs="outgoing", columns=ITSELF),
         *(_run(f"ended.{why}", f"particles whose track ended: {why}", "") for why in ENDINGS),
-        _run("ledger.belt_work", "what the drives of all belts pay", of="total"),
-        _run("ledger.drive_work", "what moves surfaces: their turn, shake and travel, and motors"),
-        _run("ledger.push_work", "what forces on particles do by hand"),
-        _run("ledger.restitution_loss", "loss of all bounces", of="total", columns=ITSELF),
+        _run("ledger.belt_work", "work of the drives of all belts", of="total"),
+        _run("ledger.drive_work", "work of the drives of moving surfaces, and of motors"),
+        _run("ledger.push_work", "work of forces by hand"),
+        _run("ledger.restitution_loss", "loss in all bounces", of="total", columns=ITSELF),
         _run("ledger.friction_loss", "heat of all slip", of="total"),
-        _run("ledger.air_loss", "what of the friction's heat air takes"),
+        _run("ledger.air_loss", "part of the friction loss that is air drag"),
         _run("ledger.damper_loss", "loss in dampers"),
         _run("ledger.spring.start", "energy in springs at the start"),
         _run("ledger.spring.end", "energy in springs at the end"),
         _run("ledger.residual", "energy that the ledger cannot explain: the numerical error",
              columns=ITSELF),
-        _run("ledger.turned_over", "energy turned over, which the residual is measured by"),
+        _run("ledger.turned_over", "energy turned over, to which the residual is relative"),
         _run("ledger.kinetic.start", "kinetic energy at the releases"),
         _run("ledger.kinetic.end", "kinetic energy at the ends of the tracks"),
         _run("ledger.potential.start", "potential energy at the releases"),
         _run("ledger.potential.end", "potential energy at the ends of the tracks"),
-        _run(PAID, "what the outgoing belt's drive pays", needs="outgoing", columns=ITSELF),
+        _run(PAID, "work of the outgoing belt's drive", needs="outgoing", columns=ITSELF),
         _run(HEAT, "heat of the slip on the outgoing belt", needs="outgoing", columns=ITSELF),
-        _run("ledger.power", "the outgoing belt's work per particle, times the rate of all the"
-             " width", "W", needs="outgoing", columns=ITSELF),
-        _run("ledger.by_surface.SURFACE.belt_work", "what the drive of SURFACE pays"),
-        _run("ledger.by_surface.SURFACE.drive_work", "what moves SURFACE"),
+        _run("ledger.power", "the outgoing belt's work per particle, times the rate over the"
+             " whole width", "W", needs="outgoing", columns=ITSELF),
+        _run("ledger.by_surface.SURFACE.belt_work", "work of the drive of the belt SURFACE"),
+        _run("ledger.by_surface.SURFACE.drive_work", "work of the drive that moves SURFACE"),
         _run("ledger.by_surface.SURFACE.damper_loss", "loss in the damper of SURFACE"),
-        _run("ledger.by_surface.SURFACE.restitution_loss", "loss of the bounces on SURFACE"),
+        _run("ledger.by_surface.SURFACE.restitution_loss", "loss in bounces on SURFACE"),
         _run("ledger.by_surface.SURFACE.friction_loss", "heat of the slip on SURFACE"),
         _run("error.max", "largest relative error of particle 0 against the theory", "",
              columns=ITSELF),

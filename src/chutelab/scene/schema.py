@@ -100,15 +100,15 @@ Reader = Callable[[Table, str], Any]
 class SceneTables(Table):
     """The tables of a scene, with all defaults that need no geometry."""
 
-    title: Text = described("Untitled scene", "What the scene is called", max_length=200)
+    title: Text = described("Untitled scene", "Title of the scene", max_length=200)
     gravity: Gravity = described(9.81, "Gravity g", "m/s²")
     gravity_deg: Angle = described(
-        0.0, "Where gravity points: 0 is down, 90 to the right; not with [incoming]", "degrees"
+        0.0, "Direction of gravity: 0 is down, 90 to the right; not with [incoming]", "degrees"
     )
     air_density: Amount = described(
         0.0,
-        "Density of still air, which slows particles down as spheres of their radius"
-        " (Schiller and Naumann); 0 is without",
+        "Density of still air; its drag slows particles down as spheres of their radius"
+        " (Schiller and Naumann); 0 is no air",
         "kg/m³",
     )
     particles: Annotated[tuple[Particle, ...], BeforeValidator(_one_or_several)] = _several(

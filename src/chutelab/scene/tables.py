@@ -60,7 +60,7 @@ class Incoming(Table):
     length: Length = described(1.0, "Length of belt before the pulley", "m")
     incline_deg: Number = described(
         0.0,
-        "Angle β at which the belt rises to the pulley, which it meets where it is tangential",
+        "Angle β at which the belt rises to the pulley; it ends where it is tangential to it",
         "degrees",
         ge=-60.0,
         le=60.0,
@@ -84,65 +84,66 @@ class Shake(Table):
 class Travel(Table):
     """Travel of a surface: constant acceleration for half of the time, then deceleration."""
 
-    to: Point = described(..., "Where its pivot comes to rest [x, y]", "m")
-    at: Amount = described(0.0, "When it begins", "s")
-    in_: Duration = described(..., "How long it takes", "s", alias="in")
+    to: Point = described(..., "Place [x, y] at which its pivot stops", "m")
+    at: Amount = described(0.0, "Time at which it begins", "s")
+    in_: Duration = described(..., "Duration", "s", alias="in")
 
 
 class When(Table):
     """Condition of a trigger."""
 
-    touched: Name = described(..., "A surface: when the first particle touches it")
+    touched: Name = described(..., "Surface that a particle has to touch")
 
 
 class Motor(Table):
-    """Motor of a hinge: it turns at this speed, as far as its torque suffices."""
+    """Motor of a hinge: it turns at this speed if its torque is sufficient."""
 
-    speed_deg: Turn = described(..., "Speed that it turns at, counterclockwise", "degrees/s")
-    torque: Torque = described(..., "The most that it turns with", "N m")
+    speed_deg: Turn = described(..., "Speed, counterclockwise", "degrees/s")
+    torque: Torque = described(..., "Largest torque", "N m")
 
 
 class Moving(Table):
     """How a surface moves, or hangs on a hinge."""
 
     shake: Shake | None = described(
-        None, "Shaking: { by = [0, 0.002], frequency = 25 }, from its place and back"
+        None, "Vibration about its place: { by = [0, 0.002], frequency = 25 }"
     )
     travel: Travel | None = described(
-        None, "A way: { to = [x, y], at = 1, in = 0.5 }, on which its pivot comes to rest"
+        None, "Travel of its pivot to a place: { to = [x, y], at = 1, in = 0.5 }"
     )
     turn: Turn = described(
         0.0, "Speed at which it turns about its pivot, counterclockwise", "degrees/s"
     )
     hinge: Point | Literal["pivot"] | None = described(
         None,
-        'It hangs free on a hinge: there [x, y], or at its "pivot"; needs a mass or an inertia',
+        'Hinge on which it hangs freely: [x, y], or its "pivot"; needs a mass or an inertia',
         "m",
     )
     mass: Mass | None = described(
-        None, "Of what hangs on a hinge: its mass, which lies evenly along it", "kg"
+        None, "Mass if it hangs on a hinge, distributed evenly along it", "kg"
     )
     inertia: Inertia | None = described(
         None,
-        "... its inertia about the hinge; default: by its mass; without a mass it has no weight",
+        "Moment of inertia about the hinge; default: from the mass; without a mass it has no"
+        " weight",
         "kg m2",
     )
     spring: Amount = described(
-        0.0, "... stiffness of a spring that turns it to rest_deg", "N m/rad"
+        0.0, "Stiffness of a spring at the hinge, which turns it to rest_deg", "N m/rad"
     )
     rest_deg: Angle = described(
-        0.0, "... angle at which its spring is at rest, from where it is written", "degrees"
+        0.0, "Angle from its place as written at which the spring is at rest", "degrees"
     )
-    damper: Amount = described(0.0, "... torque of a damper for each rad/s", "N m s/rad")
+    damper: Amount = described(0.0, "Torque of a damper at the hinge per rad/s", "N m s/rad")
     stops_deg: Stops | None = described(
         None,
-        "... between which angles [least, greatest] it turns; a stop gives nothing back",
+        "Angles [least, greatest] of its stops; a stop has no restitution",
         "degrees",
     )
-    motor: Motor | None = described(None, "... a motor: { speed_deg = 180, torque = 2 }")
+    motor: Motor | None = described(None, "Motor at the hinge: { speed_deg = 180, torque = 2 }")
     starts_when: When | None = described(
         None,
-        'When its motion or its motor begins: { touched = "bell" }, a surface; default: at once',
+        'Trigger of its motion or motor: { touched = "bell" }, a surface; default: at once',
     )
 
 
@@ -150,9 +151,11 @@ class StillPlate(Table):
     """The keys of a plate except those of its motion, which follow them."""
 
     name: Name | None = described(None, "Name of a further plate, for events and the ledger")
-    pivot: Point | None = described(None, "Of a further plate: its pivot [x, y]", "m")
+    pivot: Point | None = described(None, "Pivot [x, y] of a further plate", "m")
     distance: Length = described(
-        None, "Of the damping plate: d_okr, from the pulley's leading edge x = R to the pivot", "m"
+        None,
+        "Distance d_okr of the damping plate's pivot from the pulley's leading edge x = R",
+        "m",
     )
     angle_deg: Number = described(
         0.0,
@@ -168,7 +171,7 @@ class StillPlate(Table):
     below: Amount | None = described(
         None,
         "Length of plate below the pivot; default: down to max(0.05 m, 3 r) above the outgoing "
-        "belt, 2.0 m without [outgoing]; of a further plate 0.5 m",
+        "belt, 2.0 m without [outgoing], 0.5 m for a further plate",
         "m",
     )
     restitution: Share = pair_restitution(0.5, "particle-plate")
@@ -195,7 +198,9 @@ class Outgoing(Table):
         '"impact": drop is d2, the fall of a particle\'s centre from plate impact to landing; '
         '"top": drop is d3, from the top of the pulley (y = R) down to the belt surface',
     )
-    start: Coordinate = described(-2.0, "World x where the belt begins; it reaches forward", "m")
+    start: Coordinate = described(
+        -2.0, "World x where the belt begins; it extends forward from there", "m"
+    )
     length: Length = described(6.0, "Length of the belt", "m")
     restitution: Share = pair_restitution(0.0, "particle-belt")
     friction: Amount = pair_friction(0.5, "particle-belt")
@@ -221,41 +226,42 @@ class StillSurface(Table):
     name: Name = described(..., "Unique name, for events and the ledger")
     from_: Point | None = described(None, "First end [x, y]", "m", alias="from")
     to: Point | None = described(None, "Second end [x, y]", "m")
-    points: Polyline = described(None, "Instead of from and to: a polyline [[x, y], ...]", "m")
-    center: Point | None = described(None, "Of an arc: its centre [x, y]", "m")
-    radius: Length | None = described(None, "Of an arc: its radius", "m")
+    points: Polyline = described(None, "Polyline [[x, y], ...], instead of from and to", "m")
+    center: Point | None = described(None, "Centre [x, y] of an arc", "m")
+    radius: Length | None = described(None, "Radius of an arc", "m")
     from_deg: Angle = described(
-        0.0, "Of an arc: where it begins, counterclockwise from the x axis", "degrees"
+        0.0, "Angle at which an arc begins, counterclockwise from the x axis", "degrees"
     )
     to_deg: Angle = described(
-        360.0, "Where it ends; less than from_deg if it goes clockwise", "degrees"
+        360.0, "Angle at which an arc ends; less than from_deg if it is clockwise", "degrees"
     )
     restitution: Share = pair_restitution(0.3, "particle-surface")
     friction: Amount = pair_friction(0.4, "particle-surface")
     material: Literal["steel", "rubber"] = described(
-        "steel", "Which of a particle's material's values hold where none are given here"
+        "steel",
+        "Values of a particle's material that hold here if none are given",
     )
-    speed: Coordinate = described(0.0, "Speed along from -> to; a belt when not 0", "m/s")
-    opens_at: Coordinate | None = described(
-        None, "When it goes, and what it held falls: a gate", "s"
+    speed: Coordinate = described(
+        0.0, "Speed from the first to the second end; a belt if it is not 0", "m/s"
     )
-    closes_at: Coordinate | None = described(None, "When it comes", "s")
+    opens_at: Coordinate | None = described(None, "Time at which it vanishes (a gate)", "s")
+    closes_at: Coordinate | None = described(None, "Time at which it appears", "s")
     opens_when: When | None = described(
-        None, 'It goes when another surface is touched: { touched = "bell" }'
+        None, 'Trigger by which it vanishes: { touched = "bell" }, another surface'
     )
     closes_when: When | None = described(
-        None, 'It comes when another surface is touched: { touched = "bell" }'
+        None, 'Trigger by which it appears: { touched = "bell" }, another surface'
     )
     passes: Literal["up", "down", "left", "right", "in", "out"] | None = described(
         None,
-        "Way in which it lets particles through, and holds those that come the other way, whichever"
-        ' way it is drawn; of an arc in or out. "up": what comes from below passes, what comes from'
-        " above is carried",
+        "Direction in which particles pass through it, while those in the opposite direction are"
+        ' stopped, whichever way it is drawn; "in" or "out" for an arc. "up": particles from below'
+        " pass, those from above are carried",
     )
     pivot: Point | None = described(
         None,
-        "What it turns about, and what travels [x, y]; default: its first point, the centre of an"
-        " arc",
+        "Point [x, y] about which it turns, and which travels; default: its first point, the centre"
+        " of an arc",
         "m",
     )
 
@@ -280,7 +286,7 @@ class Surface(Moving, StillSurface):
 
     repeat: Repeats = described(
         (),
-        "Copies [[n, dx, dy], ...]: n of it, each moved on by (dx, dy) m; a second entry repeats"
+        "Copies [[n, dx, dy], ...]: n copies, each shifted by (dx, dy) m; a second entry repeats"
         " that row. All are one surface",
         max_length=2,
     )
@@ -312,21 +318,21 @@ class Joint(Table):
 
 
 class String(Joint):
-    """A string: it pulls, and goes slack; what pulls it tight loses its speed along it."""
+    """A string: it pulls, or is slack; a particle that pulls it tight loses its speed along it."""
 
     over: Point | None = described(
         None,
-        "Of a string between two particles: a pulley [x, y] that it runs over, a point without mass"
-        " and friction; not in Pymunk",
+        "Pulley [x, y] over which a string between two particles runs, a point without mass and"
+        " friction; not in Pymunk",
         "m",
     )
     length: Length | None = described(
-        None, "Length; default: the distance at the particle's release, over the pulley", "m"
+        None, "Length; default: the distance at the particle's release (over the pulley)", "m"
     )
 
 
 class Rod(Joint):
-    """A rod, as long as the distance is at the release; particles that it joins do not meet."""
+    """A rod, whose length is the distance at the release; particles that it joins do not meet."""
 
 
 class Spring(Joint):
@@ -335,16 +341,16 @@ class Spring(Joint):
     length: Length | None = described(
         None, "Length at rest; default: the distance at the particle's release", "m"
     )
-    stiffness: Stiffness = described(..., "Force for each m that it is longer", "N/m")
-    damper: Amount = described(0.0, "Force for each m/s that it gets longer by", "N s/m")
+    stiffness: Stiffness = described(..., "Force per m of extension", "N/m")
+    damper: Amount = described(0.0, "Force per m/s of extension rate", "N s/m")
 
 
 class Pin(Joint):
     """A pin that a particle turns about, or that holds two together; they do not meet."""
 
-    from_: Point = described(..., "Where it is at the release [x, y]", "m", alias="from")
+    from_: Point = described(..., "Place [x, y] of the pin at the release", "m", alias="from")
     other: Whole | None = described(
-        None, "Number of the other particle; default: it is pinned where it is", ge=0
+        None, "Number of the other particle; default: pinned to the ground", ge=0
     )
 
 
@@ -366,18 +372,18 @@ class Stream(Resolved):
     )
     width: Length | None = described(
         None,
-        "Width of the material on the belt: a rate in t/h, and all that is told per time, is of all"
-        " of it, of which a slice as thick as a particle is simulated; default: of the slice",
+        "Width of the material on the belt; rates in t/h and results per time are for this width,"
+        " of which a slice one particle thick is simulated; default: for the slice",
         "m",
     )
-    start: Amount = described(0.0, "When the first is released", "s")
+    start: Amount = described(0.0, "Time at which the first particle is released", "s")
     bed_height: Amount = described(
         0.0, "Centres spread uniformly over this height above the lowest layer", "m"
     )
     speed_spread: Amount = described(
         0.0,
-        "Uniform half-width around the release speed; of a fill, a gas: the standard deviation of"
-        " both velocity components, which are normal",
+        "Half-width of a uniform distribution around the release speed; with fill (a gas) the"
+        " standard deviation of both velocity components, normally distributed",
         "m/s",
     )
     seed: Whole = described(0, "Seed of the random draws", ge=0, le=2**63 - 1)
@@ -386,14 +392,14 @@ class Stream(Resolved):
     )
     to: Point | None = described(
         None,
-        "With at: releases along this line, each anywhere on it, drawn evenly; without a rate all"
-        " at once, evenly spaced",
+        "Second end of a line from at; each release is at a random place on it, or, without a rate,"
+        " all are released at once, evenly spaced",
         "m",
     )
     fill: Box | None = described(
         None,
-        "Instead of at: a box [[x, y], [x, y]] that is packed with all particles at once, from"
-        " below, at rest",
+        "Box [[x, y], [x, y]] that is packed with all particles at once, from below, at rest;"
+        " instead of at",
         "m",
     )
     velocity: Point | None = described(
@@ -404,10 +410,12 @@ class Stream(Resolved):
     )
     angle_deg: Angle = described(
         0.0,
-        "Of boxes and polygons: by how much they are turned at the release, counterclockwise",
+        "Angle by which boxes and polygons are turned at the release, counterclockwise",
         "degrees",
     )
-    interact: Switch = described(False, "Particle-particle contacts, of all streams if one says so")
+    interact: Switch = described(
+        False, "Whether particles meet each other; one stream sets it for all"
+    )
     restitution: Share = pair_restitution(0.5, "particle-particle")
     friction: Amount = pair_friction(0.3, "particle-particle")
 
@@ -434,34 +442,35 @@ class Run(Table):
     until: Literal["landed", "settled"] | Duration = described(
         None,
         'Ending: "landed", "settled" or a number of seconds; default: "landed" with [outgoing], '
-        'else "settled". What is 1 m below the lowest surface has left before',
+        'else "settled". A particle 1 m below the lowest surface has left the scene',
         "s",
     )
     max_time: Duration = described(
-        30.0, "Bound on every ending, counted from the last release", "s"
+        30.0, "Longest time after the last release, whatever until says", "s"
     )
     dt: Number = described(
         0.001,
-        "Longest step; without it the contact engine takes up to 2 ms where 100 particles or more"
+        "Longest step; without it the contact engine takes up to 2 ms if 100 particles or more"
         " meet, as far as hops and overlaps allow",
         "s",
         ge=1e-7,
         le=0.1,
     )
     align: bool = described(
-        True, "Whether the pymunk engine's steps of a lone particle end at contacts, or all last dt"
+        True,
+        "Whether the pymunk engine's steps of a single particle end at contacts, or all last dt",
     )
     loads: Number | None = described(
         None,
-        "Width of the bins of time in which loads on surfaces are counted; default: they are not",
+        "Width of the bins of time in which loads on surfaces are recorded; default: no loads",
         "s",
         ge=1e-5,
         le=1e3,
     )
     stress: Number | None = described(
         None,
-        "Width of the bins of time in which the contact engine keeps what each lasting contact"
-        " gives, for the stress of fields; default: it does not",
+        "Width of the bins of time in which the contact engine records the impulses of lasting"
+        " contacts, for the stress of fields; default: none",
         "s",
         ge=1e-5,
         le=1e3,
@@ -469,11 +478,14 @@ class Run(Table):
 
 
 class Sensor(Table):
-    """A line across a stream that counts what passes. Engines ignore it."""
+    """A line across a stream that counts the particles that pass. Engines ignore it."""
 
     name: Name = described(..., "Name of the sensor")
     from_: Point = described(
-        ..., "First end [x, y]; what comes from its left counts on", "m", alias="from"
+        ...,
+        "First end [x, y]; particles from the left of the line count forward",
+        "m",
+        alias="from",
     )
     to: Point = described(..., "Second end [x, y]", "m")
 
@@ -488,8 +500,8 @@ class View(Table):
 class Preset(Table):
     """A set of values under one name: the Moon, a rough belt."""
 
-    name: Text = described(..., "What it is called", min_length=1, max_length=40)
-    set: Values = described(..., "Keys of the scene, and what they become")
+    name: Text = described(..., "Name", min_length=1, max_length=40)
+    set: Values = described(..., "Keys of the scene, and their values")
 
     def __hash__(self) -> int:
         # Equal presets need equal hashes, though values may be lists.
@@ -514,11 +526,11 @@ class Live(Table):
         False, "Whether path, landing and numbers are hidden until a mark is set and play pressed"
     )
     controls: Keys | None = described(
-        None, "Keys of the scene that can be changed there; default: all that have a handle"
+        None, "Keys of the scene that can be changed in the page; default: all that have a handle"
     )
-    panels: Panels | None = described(None, "What is shown beside the picture; default: all")
-    ranges: Ranges = described({}, "Of keys: [from, to] of what they can be changed to")
-    presets: Presets = described((), "Buttons, each of which changes some values")
+    panels: Panels | None = described(None, "Panels beside the picture; default: all")
+    ranges: Ranges = described({}, "Ranges [from, to] of keys that can be changed")
+    presets: Presets = described((), "Buttons, each of which sets some values")
 
     def __hash__(self) -> int:
         return hash((self.predict, self.controls, self.panels, *self.ranges, *self.presets))
@@ -533,20 +545,20 @@ class Expect(Table):
 
     quantity: Text = described(
         ...,
-        "What is looked at: a paper's symbol such as x2 or phi1_deg, or a key of the JSON summary "
-        "such as landing.x (of several particles particles[0].landing.x), landing.x.mean, "
+        "Name of a quantity: a symbol of the paper such as x2 or phi1_deg, or a name such as "
+        "landing.x (with several particles particles[0].landing.x), landing.x.mean, "
         "ledger.by_surface.outgoing.belt_work",
         max_length=200,
     )
     value: Literal["theory"] | Value = described(
         ...,
-        'What it should be, in its unit (SI; degrees for names in _deg), or "theory": what the '
-        "closed form gives",
+        'Expected value, in its unit (SI; degrees for names in _deg), or "theory": that of the '
+        "closed form",
     )
     tolerance: Share | Words = described(
         ...,
-        "What it may be off: a number is relative (0.01 is 1 %; of the value, or of what such "
-        'quantities are measured by in the scene if that is more), a string absolute ("0.5 mm")',
+        "Largest error: a number is relative (0.01 is 1 %) to the value, or to the scale of such "
+        'quantities in the scene if that is larger; a string is absolute ("0.5 mm")',
     )
     tolerance_contact: Share | Words | None = described(
         None, 'The same for the contact engine, or "none"; default: tolerance'
@@ -555,7 +567,7 @@ class Expect(Table):
         None, 'The same for the pymunk engine, or "none"; default: tolerance'
     )
     source: Text = described(
-        ..., "Where it is from: an equation or a table of the paper, a closed form", max_length=200
+        ..., "Source: an equation or a table of the paper, a closed form", max_length=200
     )
 
     def allowed(self, engine: str) -> tuple[float, str] | None:

@@ -5,7 +5,7 @@
 >>> chutelab.compare(recording).max < 1e-12
 True
 
-The rooms of the house; each imports only those below it:
+The packages; each imports only those below it:
 
 - `cli`: the commands;
 - `classroom`: lessons, exercises, grading;
@@ -18,9 +18,9 @@ The rooms of the house; each imports only those below it:
 - `scene`: scene files;
 - `core`: C code that Python and the page both run: builds machines, runs the exact and the contact
   engine, judges runs;
-- `util`: small things for all.
+- `util`: helpers for all of them.
 
-What most people need is here: `scenes`, `load`, `Scene`, `SceneError`, `simulate`, `Recording`,
+The most important names are here: `scenes`, `load`, `Scene`, `SceneError`, `simulate`, `Recording`,
 `Kind`, `LawWarning`, `theory`, `compare`, `measure`, `sweep`, `solve`, `overlay`, `animate`,
 `live`, and `exercises`, `measured`, `design`, `figures`. Each is imported when it is first asked
 for, so that text output never waits for matplotlib, nor the exact engine for pymunk.

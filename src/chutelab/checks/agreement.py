@@ -181,8 +181,8 @@ def _with_base(
 ) -> Agreement:  # fmt: skip
     """Compare an answer with the base.
 
-    If both engines step over impacts, it is chance which grazing contacts they report. With `wide`,
-    only the end and the ledger have to come nearer.
+    If both engines step over impacts, it depends on chance which grazing contacts they report. With
+    `wide`, only the end of the track and the ledger have to converge.
     """
     pair = (name, base.engine)
     error, which = distance(recording, base)

@@ -37,10 +37,10 @@ class Releases:
     carried: Bools
     stream: Ints  # its number: particles of the first stream come first, then those of the next
     kind: Ints  # its row in the machine's tables of pairs; in a family each has its own row
-    # (N, 4), m: left, bottom, right and top of where it is in the scene. With gravity only the
-    # bottom is finite: what flies up comes back. What is released below all surfaces, or hangs on a
-    # string, has not left: the box holds releases, too. Where particles do not meet it holds each
-    # one's own alone, so that a particle does the same alone and with others
+    # (N, 4), m: left, bottom, right and top of the box outside of which it has left the scene. With
+    # gravity only the bottom is finite, as particles that fly up come back. The box holds releases,
+    # too, since particles may be released below all surfaces, or hang on a string. Where particles
+    # do not meet, it holds only the particle's own release, so each does the same with others
     exit_box: Floats
 
     def __post_init__(self) -> None:

@@ -239,8 +239,8 @@ class Motion(tuple[Floats, Floats]):
 class Record(Shown):
     """A finished run: read-only arrays, the same type from every engine.
 
-    The base of `Recording`, which `simulate` returns. Engines write it and the modules of this room
-    read it, so it imports none of them.
+    The base of `Recording`, which `simulate` returns. Engines write it and the modules of this
+    package read it, so it imports none of them.
 
     Attributes
     ----------

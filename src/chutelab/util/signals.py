@@ -22,9 +22,9 @@ NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 """HUP comes when a terminal closes; BREAK is what Windows sends then, and for Ctrl-Break."""
 
 GRACE = 3.0
-"""s after a signal in which further ones are passed over, for the first is being obeyed.
+"""s after a signal during which further signals are ignored, as the first is being handled.
 
-Later ones are raised again: the first may have been lost in code that catches everything.
+After that a signal is raised again, since code that catches everything may have lost the first.
 """
 
 
@@ -44,11 +44,11 @@ _obeyed: list[tuple[int, float]] = []
 """The signals that were raised, and when, s."""
 
 _answered: list[tuple[int, float]] = []
-"""Signals that have been handled: the code that goes on knows of them."""
+"""Signals that the running code has caught and handled."""
 
 
 def answer() -> None:
-    """Go on after a signal that was caught: `ctrl_c_waits` does not raise it again."""
+    """Mark the raised signals as handled: `ctrl_c_waits` does not raise them again."""
     _answered[:] = _obeyed
 
 
@@ -56,10 +56,10 @@ def answer() -> None:
 def raised(*, last: bool = False) -> Iterator[None]:
     """Raise `Terminated` for each signal of `NAMES`.
 
-    Signals that are ignored (``nohup``, jobs in the background) or have another handler are left
-    alone, as are all in a thread, which cannot set handlers. With `last` the program ends after
-    this: then a signal raises nothing, since nothing would catch it, but ends the process at once
-    with the exit code that it would have had.
+    Signals that are ignored (``nohup``, jobs in the background) or have another handler are not
+    changed; nor is any in a thread, which cannot set handlers. With `last` the program ends after
+    this block. From then on a signal ends the process at once, with the exit code that it would
+    have had, since no code would catch an exception.
     """
     usual = (signal.SIG_DFL, signal.default_int_handler)
     known = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
@@ -118,10 +118,10 @@ def ctrl_c_waits(*, lazily: bool = False) -> Iterator[Callable[[], None]]:
     """Give a function that raises a delayed Ctrl-C.
 
     So a run is interrupted at a suitable point, and keeps its results. A signal that comes `GRACE`
-    after the first is raised at once. In a thread, and with another handler, nothing changes. The
-    function also raises again what `raised` has raised: if work goes on, some code that catches
-    everything (an import, say) has lost it. With `lazily` signals are delayed only from the first
-    call of the function on, as short work needs no handler.
+    after the first is raised at once. In a thread, and with another handler, nothing changes. If
+    `raised` has raised a signal and work still goes on, some code that catches everything (such as
+    an import) has lost it; the function then raises it again. With `lazily` signals are delayed
+    only from the first call of the function on, as short work needs no handler.
     """
     came: list[float] = []
     before: Any = None

@@ -406,9 +406,9 @@ SPREAD = 3.0
 """If two estimates differ by a larger factor, neither is reported."""
 
 LATE = 0.4
-"""Weight of the pace at the trial's end against the pace of all of it, in logarithms: of 76 random
-crowds that were cut off after 0.1 s the pace of all of it is too low by 4 for one in ten, the one
-at the end too high by 9."""
+"""Weight of the pace at the trial's end against that of the whole trial, in logarithms. Of 76
+random crowds that were cut off after 0.1 s, one in ten takes 4 times as long as the pace of the
+whole trial says, and one in ten a ninth of what the pace at its end says."""
 
 CROWDED = 2.0
 """Factor by which a particle of a crowd takes longer to land or settle than one alone, about."""

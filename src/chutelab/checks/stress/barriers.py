@@ -418,10 +418,10 @@ def cone(e: Evidence) -> Verdict | None:
 def rebound(e: Evidence) -> Verdict | None:
     """Judge whether speeds after impacts are the restitution times the speeds before.
 
-    This applies to single impacts on what does not move, so not to crowds and corners. What is as
-    slow as gravity makes it in a step may do what it likes in a stepped engine, but be faster than
-    before; and the pymunk engine has speeds only to that change. A mass point has no contact
-    normal. The figure is the deviation as a share of the largest speed.
+    This applies to single impacts on surfaces at rest, so not to crowds and corners. With steps,
+    an impact slower than the change of speed by gravity in a step may have any restitution up to 1,
+    and the pymunk engine knows speeds only to that change. A mass point has no contact normal. The
+    figure is the deviation as a share of the largest speed.
     """
     events = e.recording.select(Kind.IMPACT, Kind.LANDING)
     if e.alike or e.machine.interact or not e.radii.all():

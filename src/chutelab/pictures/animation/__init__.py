@@ -5,7 +5,7 @@ picture of the machine before it begins.
 
 - `moments`: the moments that are shown, their duration, and what happened, in words.
 - `actors`: moving parts: particles, arrows, belts, pulley, and the energy bars.
-- `drawing`: how they are drawn, and which pixels that changes.
+- `drawing`: draws them, and finds the pixels that change.
 - `files`: how pictures become a GIF or a video.
 """
 
@@ -255,11 +255,11 @@ class Stage:
         self._painted: list[Part] = []
 
     def paint(self, index: int) -> tuple[NDArray[np.uint8], list[Part]]:
-        """Draw one moment; return its pixels, (H, W, 4), RGBA, until the next is drawn.
+        """Draw one moment; return its pixels, (H, W, 4), RGBA, valid until the next is drawn.
 
-        With the parts outside of which they are those of the moment painted before.
+        Also returned are the regions that may have changed since the moment painted before.
         """
-        # Nothing else is where bars and texts are.
+        # Bars and texts overlap nothing else.
         panel: list[Bar | Writing] = [*self.bars, *self.writings]
         news = [one for one in panel if not one.stays(index)]
         before = [*self._painted, *(one.part for one in news)]

@@ -1,8 +1,8 @@
-"""Draws the moving parts of a film, and tells which pixels that may have changed.
+"""Draw the moving parts of a film, and return the regions of the picture that may have changed.
 
-Most of a frame is the frame before. Matplotlib draws an artist with much that no frame needs, and
-lays out a changed text again: lines, dots, arrows, bars and texts are drawn here in a fraction of
-the time, and pixel by pixel the same. Every other artist draws itself.
+Most pixels of a frame are those of the frame before. Matplotlib does much work for each artist that
+a frame does not need, such as laying out a changed text. So lines, dots, arrows, bars and texts are
+drawn here, in a fraction of the time and with the same pixels. Matplotlib draws all other artists.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Part = tuple[slice, slice]
 
 
 class Canvas:
-    """The pixels of a figure, drawn without what is animated, and what draws on them."""
+    """The pixels of a figure, at first without its animated artists, and renderers for them."""
 
     def __init__(self, figure: Figure) -> None:
         canvas = cast(Any, figure.canvas)  # its methods are not annotated
@@ -49,13 +49,13 @@ class Canvas:
         self._clean = self.pixels.copy()
 
     def clear(self, parts: Iterable[Part]) -> None:
-        """Let parts be as they were at first."""
+        """Restore regions of the picture without animated artists."""
         for part in parts:
             self.pixels[part] = self._clean[part]
 
 
 class Frame:
-    """The rectangle of some axes that stay as they are, and from their units to pixels."""
+    """The rectangle of axes whose limits do not change, and the transform of units to pixels."""
 
     def __init__(self, ax: Axes) -> None:
         # Agg rounds, and draws on the pixel beyond.
@@ -64,7 +64,7 @@ class Frame:
         self.to_pixels = cast(Affine2D, ax.transData.get_affine().frozen())
 
     def parts(self, low: Floats, high: Floats) -> Iterator[Part]:
-        """Yield the parts of the picture that boxes on the axes cover.
+        """Yield the regions of the picture that boxes on the axes cover.
 
         `low` and `high` are their corners, (n, 2), pixels from the lower left; NaN is no box.
         """
@@ -76,7 +76,7 @@ class Frame:
 
 
 def _context(ax: Axes, width: float, color: Any) -> GraphicsContextBase:
-    """Return how to draw a path on axes; the width is in pt."""
+    """Return the drawing style of a path on axes; the width is in pt."""
     found = GraphicsContextBase()
     found.set_clip_rectangle(ax.bbox)
     found.set_linewidth(width)
@@ -85,7 +85,7 @@ def _context(ax: Axes, width: float, color: Any) -> GraphicsContextBase:
 
 
 APART = 32
-"""Up to so many dots have each a part of the picture, more of them one together."""
+"""Up to this number, each dot is a region of its own; more dots are one region together."""
 
 
 class Strokes:
@@ -115,7 +115,7 @@ class Strokes:
         self.room = points * (0.5 * size + width) + 2.0
 
     def paint(self, canvas: Canvas) -> Iterator[Part]:
-        """Draw, and yield the parts that may have changed."""
+        """Draw, and yield the regions that may have changed."""
         places = np.array(self.line.get_data(), dtype=float).T
         if not len(places) or not self.line.get_visible():
             return
@@ -152,7 +152,7 @@ class Arrows(Artist):
         self.as_it_is = Affine2D()
 
     def paint(self, canvas: Canvas) -> Iterator[Part]:
-        """Draw, and yield the parts that may have changed."""
+        """Draw, and yield the regions that may have changed."""
         ends = self.frame.to_pixels.transform(np.concatenate([self.tails, self.tips]))
         tails, tips = ends.view(complex).reshape(2, -1)
         for (context, face), tail, way in zip(self.looks, tails, tips - tails, strict=True):
@@ -166,7 +166,7 @@ class Arrows(Artist):
 
 
 class Itself:
-    """Lets an artist draw itself."""
+    """An artist that Matplotlib draws."""
 
     def __init__(self, artist: Artist) -> None:
         self.artist = artist
@@ -175,14 +175,14 @@ class Itself:
         self.parts = [*frame.parts(*frame.box[:, None])] if artist.get_clip_on() else [whole]
 
     def paint(self, canvas: Canvas) -> Iterator[Part]:
-        """Draw, and yield the parts that may have changed."""
+        """Draw, and yield the regions that may have changed."""
         self.artist.draw(canvas.renderer)
         if self.artist.get_visible():
             yield from self.parts
 
 
 def painter(artist: Artist) -> Strokes | Arrows | Itself:
-    """Return what draws an artist, on axes that stay as they are."""
+    """Return the painter of an artist, on axes whose limits do not change."""
     if isinstance(artist, Arrows):
         return artist
     if isinstance(artist, Line2D) and artist.get_linestyle() in ("-", "None"):
@@ -194,9 +194,9 @@ NOWHERE: Part = slice(0, 0), slice(0, 0)
 
 
 class Bar:
-    """A stacked bar of whole pixels, on axes that stay as they are.
+    """A stacked bar of whole pixels, on axes whose limits do not change.
 
-    `heights` are those of its blocks from the bottom up, (T,) each, at the moments.
+    `heights` are those of its blocks from the bottom up, (T,) each, at the moments of the film.
     """
 
     def __init__(
@@ -214,15 +214,15 @@ class Bar:
         self.rows = (round(ax.figure.bbox.height) - ups).astype(int)
         shares = np.array([to_rgba(color) for color in colors[::-1]])
         self.colors = np.round(255.0 * shares).astype(np.uint8).view("<u4")
-        # What is in the picture, and where.
+        # The moment in the picture, and the region of the bar.
         self.now, self.part = -1, NOWHERE
 
     def stays(self, index: int) -> bool:
-        """Whether it looks at a moment as it does in the picture."""
+        """Whether its pixels at a moment are those in the picture."""
         return self.now >= 0 and bool((self.rows[index] == self.rows[self.now]).all())
 
     def paint(self, canvas: Canvas, index: int) -> Part:
-        """Fill its pixels at a moment; return the part that they are."""
+        """Fill its pixels at a moment; return their region."""
         rows = self.rows[index]
         self.now, self.part = index, (slice(int(rows[0]), int(rows[-1])), self.columns)
         canvas.pixels[self.part] = np.repeat(self.colors, np.diff(rows), axis=0)
@@ -248,9 +248,9 @@ class Writing:
         self.font = _font(size * dpi / 72.0)
         self.place, self.anchor, self.said = (round(x), round(y)), anchor, said
         self.ink = style.INK
-        # Texts as what covers the picture, and from where on.
+        # The mask of each text, and its upper left corner.
         self.masks: dict[str, tuple[tuple[int, int], Image.Image]] = {}
-        # What is in the picture, and where.
+        # The text in the picture, and its region.
         self.now, self.part = "", NOWHERE
 
     def stays(self, index: int) -> bool:
@@ -258,7 +258,7 @@ class Writing:
         return self.said[index] == self.now
 
     def paint(self, canvas: Canvas, index: int) -> Part:
-        """Write the text of a moment; return the part that it covers."""
+        """Write the text of a moment; return the region that it covers."""
         self.now, gap = self.said[index], 0.35 * self.font.size
         if self.now not in self.masks:
             box = canvas.text.textbbox(self.place, self.now, self.font, self.anchor, gap)

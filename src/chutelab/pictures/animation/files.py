@@ -56,7 +56,7 @@ class Colours:
 
     def __init__(self) -> None:
         self.table = b"".join(bytes.fromhex(colour[1:]) for colour in palette())
-        # Table over the upper six bits of red, green and blue, filled as they come.
+        # Table over the upper six bits of red, green and blue, filled when a colour first occurs.
         self.known = np.full(1 << 18, -1, dtype=np.int16)
 
     def of(self, pixels: NDArray[np.uint32]) -> NDArray[np.uint8]:
@@ -74,9 +74,9 @@ class Colours:
 
 
 def changed(now: NDArray[np.uint32], before: NDArray[np.uint32], parts: Iterable[Part]) -> Ints:
-    """Return the numbers of the pixels, row by row, that changed in parts of a picture.
+    """Return the numbers of the pixels, row by row, that changed in regions of a picture.
 
-    The picture before becomes the picture now.
+    `before` is updated to `now` there.
     """
     found = [np.empty(0, dtype=np.intp)]
     for rows, columns in parts:
@@ -97,8 +97,8 @@ def write_gif(
 ) -> None:
     """Write pictures of one size, (H, W, 4), RGBA, as a GIF that loops for ever.
 
-    With each are the parts outside of which it is the one before. It stays for its delay in
-    hundredths of a second; equal ones in a row become one frame. Only pixels that changed are
+    Each picture comes with the regions in which it may differ from the one before. Delays are in
+    hundredths of a second; equal pictures in a row become one frame. Only pixels that changed are
     converted and written. The comment is stored, not shown.
     """
     colours = Colours()

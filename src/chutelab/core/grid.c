@@ -44,6 +44,10 @@ static Span span_of(const double *box) {
     return s;
 }
 
+/* Box round all free disks, and whether disks outside it are in the grid, too: most steps need none of these. */
+static double around[4];
+static int has_all;
+
 static void enter(int i, Span s) {
     Disk *d = W.disks + i;
     if (s.cells > MOST_CELLS || W.cell_count + s.cells > W.cell_room) {
@@ -70,8 +74,18 @@ static int overlaps(const Disk *a, const double *box) {
     return a->left < box[2] && a->right > box[0] && a->bottom < box[3] && a->top > box[1];
 }
 
+/* Enter all disks, if a box that is to be compared with them is not within that of the free disks. */
+static void enter_rest(const double *box) {
+    int inside = box[0] >= around[0] && box[1] >= around[1] && box[2] <= around[2] && box[3] <= around[3];
+    if (has_all || inside) return;
+    has_all = 1;
+    for (EACH_LIVE(i))
+        if (!overlaps(W.disks + i, around)) enter(i, span_of(&W.disks[i].left));
+}
+
 /* Write the disks whose boxes overlap a box, which covers the cells `s`, to `W.found`; return how many. */
 static int query(int i, const double *box, Span s) {
+    enter_rest(box);
     int n = 0, stamp = ++W.stamp;
     W.disks[i].mark = stamp;
     if (s.cells > MOST_CELLS) {
@@ -111,6 +125,8 @@ int list_near(double end) {
     double extent = 0;
     int live = 0;
     W.near_count = W.later_count = W.cell_count = W.wide_count = 0;
+    has_all = 1;
+    for (int k = 0; k < 4; k++) around[k] = k < 2 ? INFINITY : -INFINITY;
     for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         d->wide = 0;
@@ -118,14 +134,22 @@ int list_near(double end) {
         box_of(d, end, W.interact ? SKIN : 0, &d->left);
         extent += MAX(d->right - d->left, d->top - d->bottom);
         live++;
+        if (d->mode != FREE) continue;
+        around[0] = MIN(around[0], d->left);
+        around[1] = MIN(around[1], d->bottom);
+        around[2] = MAX(around[2], d->right);
+        around[3] = MAX(around[3], d->top);
     }
     if (!W.interact) return 1;
     /* With cells of 1.5 times the mean box, most boxes overlap two to four cells. */
     W.cell = live ? 1.5 * extent / live : 1;
     memset(W.heads, 0xff, (unsigned long)W.bucket_count * sizeof(int));
     /* Riders and sleepers can meet free disks only: they are entered first and query no others. */
-    for (EACH_LIVE(i))
-        if (W.disks[i].mode != FREE) enter(i, span_of(&W.disks[i].left));
+    for (EACH_LIVE(i)) {
+        if (W.disks[i].mode == FREE) continue;
+        if (overlaps(W.disks + i, around)) enter(i, span_of(&W.disks[i].left));
+        else has_all = 0;
+    }
     for (EACH_LIVE(i)) {
         const Disk *d = W.disks + i;
         if (d->mode != FREE) continue;

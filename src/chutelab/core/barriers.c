@@ -54,7 +54,7 @@ PAIRED static int apart(const Box *a, const double *piece, double margin) {
 static double reach_of(const Barrier *b, const Mover *m) {
     double x = MAX(fabs(b->box[0] - m->pivot[0]), fabs(b->box[2] - m->pivot[0]));
     double y = MAX(fabs(b->box[1] - m->pivot[1]), fabs(b->box[3] - m->pivot[1]));
-    return hypot(x, y);
+    return length_of(x, y);
 }
 
 /* Whether its angle is recorded as states of the run: of a hinge, or turned by hand. */
@@ -77,7 +77,7 @@ double swiftest(const Barrier *b, double *haste) {
     *haste = 0;
     if (!b->mover) return 0;
     const Mover *m = L.movers + b->mover - 1;
-    double rate = 2 * PI * m->frequency, by = hypot(m->by[0], m->by[1]), way = hypot(m->way[0], m->way[1]);
+    double rate = 2 * PI * m->frequency, by = length_of(m->by[0], m->by[1]), way = length_of(m->way[0], m->way[1]);
     double reach = reach_of(b, m), pace = m->lasts ? 2 * way / m->lasts : 0, turn = fabs(m->turn);
     if (is_swung(m))
         for (int n = m->first; n <= m->last; n++) turn = MAX(turn, fabs(L.swings[n].rate));
@@ -123,7 +123,7 @@ static int follows(const Barrier *b) {
     if (b->surface != last->surface || b->appears != last->appears || (b->radius > 0) != (last->radius > 0)) return 0;
     for (int n = 0; n < 4; n++) {
         const double *one = b->end + n / 2 * 2, *other = last->end + n % 2 * 2;
-        if (hypot(one[0] - other[0], one[1] - other[1]) <= 1e-9 * L.largest) return 1;
+        if (length_of(one[0] - other[0], one[1] - other[1]) <= 1e-9 * L.largest) return 1;
     }
     return 0;
 }
@@ -178,7 +178,7 @@ static double along(const Barrier *b, double x, double y) {
 /* Distance from the line or circle of a piece, m; positive on the left, or outside. */
 double beside(const Barrier *b, double x, double y) {
     if (b->radius == 0) return b->tx * (y - b->y) - b->ty * (x - b->x);
-    return hypot(x - b->x, y - b->y) - b->radius;
+    return length_of(x - b->x, y - b->y) - b->radius;
 }
 
 /* Whether the foot of a place is on the piece, more than `margin` (m) from its ends. */
@@ -193,16 +193,16 @@ int is_within(const Barrier *b, double x, double y, double margin) {
 double distance(const Barrier *b, double x, double y) {
     if (b->radius == 0) {
         double way = MIN(MAX(foot(b, x, y), 0), b->length);
-        return hypot(x - b->x - way * b->tx, y - b->y - way * b->ty);
+        return length_of(x - b->x - way * b->tx, y - b->y - way * b->ty);
     }
     if (b->whole || along(b, x, y) <= b->extent * b->radius) return fabs(beside(b, x, y));
-    return MIN(hypot(x - b->end[0], y - b->end[1]), hypot(x - b->end[2], y - b->end[3]));
+    return MIN(length_of(x - b->end[0], y - b->end[1]), length_of(x - b->end[2], y - b->end[3]));
 }
 
 /* `beside`, but beyond the ends of an arc the distance from the tangent there, m. */
 static double aside(const Barrier *b, double x, double y) {
     if (b->radius == 0 || b->whole || along(b, x, y) <= b->extent * b->radius) return beside(b, x, y);
-    int last = hypot(x - b->end[0], y - b->end[1]) > hypot(x - b->end[2], y - b->end[3]);
+    int last = length_of(x - b->end[0], y - b->end[1]) > length_of(x - b->end[2], y - b->end[3]);
     const double *end = b->end + 2 * last;
     return ((x - end[0]) * (end[0] - b->x) + (y - end[1]) * (end[1] - b->y)) / b->radius;
 }
@@ -361,8 +361,8 @@ static void add_edge(const Barrier *b, const double *q, const double *r, double 
         /* Outside is an end of the edge; deepest inside the place nearest to the centre. */
         const double *out = side < 0 ? q : r;
         double deepest = MIN(MAX(-half / a, 0), 1);
-        beyond[0] = MAX(beyond[0], hypot(out[0] - b->x, out[1] - b->y) - b->radius);
-        beyond[1] = MAX(beyond[1], b->radius - hypot(x + deepest * ex, y + deepest * ey));
+        beyond[0] = MAX(beyond[0], length_of(out[0] - b->x, out[1] - b->y) - b->radius);
+        beyond[1] = MAX(beyond[1], b->radius - length_of(x + deepest * ex, y + deepest * ey));
     }
 }
 
@@ -373,7 +373,7 @@ static double deep_in(const Barrier *b, double (*p)[2], int count) {
     double clear = -INFINITY, low = INFINITY, high = -INFINITY, beyond[2] = {0, 0}, ends[2] = {INFINITY, INFINITY};
     for (int n = 0; n < count; n++) {
         const double *q = p[n], *r = p[n + 1 < count ? n + 1 : 0];
-        double ex = r[0] - q[0], ey = r[1] - q[1], size = hypot(ex, ey), off[2];
+        double ex = r[0] - q[0], ey = r[1] - q[1], size = length_of(ex, ey), off[2];
         for (int k = 0; k < 2; k++) {
             off[k] = ((b->end[2 * k] - q[0]) * ey - (b->end[2 * k + 1] - q[1]) * ex) / size;
             ends[k] = MIN(ends[k], -off[k]);
@@ -563,7 +563,7 @@ PAIRED static void check_beside_moving(const Interval *now, Barrier *b, int numb
     const double *knot = KNOT(now->knot);
     const Two *p = now->path.p;
     double h = knot[L.row] - knot[0], way = 0, haste, share = 0, before = 0, corners[MOST_CORNERS][2];
-    for (int n = 0; n < 3; n++) way = MAX(way, 3 * hypot(p[n + 1][0] - p[n][0], p[n + 1][1] - p[n][1]));
+    for (int n = 0; n < 3; n++) way = MAX(way, 3 * length_of(p[n + 1][0] - p[n][0], p[n + 1][1] - p[n][1]));
     way += h * swiftest(b, &haste);
     if (is_cornered()) way += h * At.reach * MAX(fabs(knot[5]), fabs(knot[L.row + 5]));
     At.deepest = -1;

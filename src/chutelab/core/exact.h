@@ -42,6 +42,7 @@ typedef struct {
     double rho;             /* m; distance of a particle's centre from that of the circle in contact; negative inside,
                                NAN if the particle doesn't fit in */
     double begin, extent;   /* rad; of an arc: first angle of contacts, and their range */
+    double least[2], most[2]; /* x and y of unit vectors in that range */
     double crown[2];        /* of an end: unit vector to the middle of the half that belongs to the left face of a piece */
     double speed;           /* m/s; along a face and its ends, clockwise round an arc */
     double turning;         /* rad/s; of arcs and their ends */
@@ -101,6 +102,7 @@ typedef struct {
     Onward *opposite;       /* the same: what bounds, together with a face, the sector beside its end */
     double size;            /* m; the largest coordinate */
     double touch;           /* m; smaller gaps are rounding */
+    double fitted;          /* m; radius that they fit, NAN at first */
 } Obstacles;
 
 extern Exact E;

@@ -398,6 +398,10 @@ void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
         found[way] = (Bound){ way ? INFINITY : -INFINITY, NONE, 0, 0, NONE };
     double reach = fabs(rho);
     Box box = { { c->x - reach, c->y - reach }, { c->x + reach, c->y + reach } };
+    for (int n = 0; n < 2 && c->extent < TURN; n++) {
+        box.low[n] = MAX(box.low[n], c->low[n] - O.touch);
+        box.high[n] = MIN(box.high[n], c->high[n] + O.touch);
+    }
     for (int k = 0; k < O.faces; k++)
         for (int n = 0; n < 2 && is_near(&box, O.all + k); n++) {
             const Obstacle *o = O.all + k;

@@ -11,7 +11,7 @@
 /* Share of a curvature; two pieces that leave a place in the same direction lie on each other if their curvatures differ
    by less. */
 #define CIRCULAR 1e-9
-/* Margin of the boxes of faces, in `touch`. */
+/* Margin of the boxes of faces and arcs, in `touch`. */
 #define BOX_TOUCHES 64.0
 /* rad; at a concave bend this slight a piece may, by rounding, end before the next one is met: it continues as the next
    one. */
@@ -449,6 +449,17 @@ static int make_ends(int disks) {
     return count;
 }
 
+/* Set the least and largest x and y of the directions to an arc. */
+static void bound_directions(Obstacle *o) {
+    for (int k = 0; k < 2; k++) o->least[k] = 1.0, o->most[k] = -1.0;
+    for (int n = -2; n < 4; n++) {
+        double turn = n < 0 ? -(n + 1) * o->extent : modulo(0.5 * PI * n - o->begin, TURN), way[2];
+        if (!(turn <= o->extent)) continue;
+        sin_cos(o->begin + turn, way + 1, way);
+        for (int k = 0; k < 2; k++) o->least[k] = MIN(o->least[k], way[k]), o->most[k] = MAX(o->most[k], way[k]);
+    }
+}
+
 static int list_obstacles(int disks) {
     int most = part_count + O.tip_count + 2 * O.arcs + 1;
     O.all = reserve(most, sizeof *O.all);
@@ -471,6 +482,7 @@ static int list_obstacles(int disks) {
         o->met = k < O.arcs ? OUTSIDE : INSIDE;
         o->x = a->center[0], o->y = a->center[1], o->bend = a->radius;
         o->begin = a->begin, o->extent = extent_of(a);
+        bound_directions(o);
         place_of_piece(o, piece);
         o->turning = turning_of(piece);
     }
@@ -725,6 +737,7 @@ int lay_obstacles(int member) {
     bend_source = reserve(E.arc_count, sizeof *bend_source);
     if (arena_full) return 0;
     points = !(E.lones[member].radius > 0.0);
+    O.fitted = NAN;
     part_count = E.segment_count, O.arcs = E.arc_count, O.bent = 0;
     for (int s = 0; s < part_count; s++) {
         const Segment *g = segments + s;
@@ -764,7 +777,8 @@ int lay_obstacles(int member) {
 /* Fit the obstacles to the radius and the release of the present particle. */
 void fit_obstacles(void) {
     double r = A.given->radius, touch = ULP * (TOUCH_ULPS * size_for(A.given) + E.far);
-    O.touch = touch;
+    if (r == O.fitted && touch == O.touch) return;
+    O.touch = touch, O.fitted = r;
     for (int k = 0; k < O.count; k++) {
         Obstacle *o = O.all + k;
         double reach = r + BOX_TOUCHES * touch, x = o->x, y = o->y;
@@ -778,6 +792,11 @@ void fit_obstacles(void) {
         if (o->met != FACE) reach = isnan(o->rho) ? -INFINITY : fabs(o->rho - touch);
         o->low[0] = MIN(o->x, x) - reach, o->low[1] = MIN(o->y, y) - reach;
         o->high[0] = MAX(o->x, x) + reach, o->high[1] = MAX(o->y, y) + reach;
+        for (int n = 0; n < 2 && o->extent < TURN; n++) {
+            double at = n ? o->y : o->x;
+            o->low[n] = MAX(o->low[n], at + fabs(o->rho) * o->least[n] - BOX_TOUCHES * touch);
+            o->high[n] = MIN(o->high[n], at + fabs(o->rho) * o->most[n] + BOX_TOUCHES * touch);
+        }
     }
 }
 

@@ -407,8 +407,8 @@ SPREAD = 3.0
 
 LATE = 0.4
 """Weight of the pace at the trial's end against that of the whole trial, in logarithms. Of 76
-random crowds that were cut off after 0.1 s, one in ten takes 4 times as long as the pace of the
-whole trial says, and one in ten a ninth of what the pace at its end says."""
+random crowds that were cut off after 0.1 s, one in ten takes at least 4 times as long as the pace
+of the whole trial says, and one in ten at most a ninth of what the pace at its end says."""
 
 CROWDED = 2.0
 """Factor by which a particle of a crowd takes longer to land or settle than one alone, about."""

@@ -93,7 +93,7 @@ enum Phase { PART, STEP, WITHIN };
 static inline double square(double a) { return a * a; }
 
 /* A place where a particle with corners is near something: the unit normal towards the particle, the gap now and later,
-   the position; which corner of both it is, and what that is on, see corners.c; and the number of such places of the two. */
+   the position; which corner of both it is, and what that is on, see shapes.c; and the number of such places of the two. */
 typedef struct { double nx, ny, gap, later, x, y; int which, on, many; } Touch;
 /* Greatest number of such places of two. */
 #define MOST_TOUCHES 8
@@ -321,14 +321,18 @@ void take_halves_back(void);
 int has_halves(void);
 void press_again(double h);
 
-/* corners.c */
+/* shapes.c */
 double inner_of(int i, int j);
-double whirl_of(const Disk *d);
 int list_touches(int i, int j, double t, double within, double later, Touch *list);
 double clear_of_corners(const Disk *d, double x, double y, int k, double t);
 int would_overlap(int i, double x, double y, int j, double t, double deep);
+
+/* meeting.c */
 double fastest_of(int i, int j, double t, double span);
 double meet_corners(int i, int j, double from, double until, double most, double soft);
+
+/* corners.c */
+double whirl_of(const Disk *d);
 void describe_touch(Contact *c, int i, int j, const Touch *t);
 const Contact *place_before(const Contact *c);
 int list_still(int i, int j, double h, const Contact **list, double *changes);

@@ -1,0 +1,197 @@
+/* When particles with corners meet: the instant at which the first gap closes, on the exact paths of corners with rotation. */
+
+#include "shape.h"
+
+/* Least number of steps in which gaps are checked over a span. A contact that begins and ends within one is left to the
+   next step. */
+#define STRIDES 8
+/* rad; a particle that rotates by more in a span may leave something round by one corner and meet it with the next. */
+#define ROLLS 0.05
+/* Greatest number of iterations to the instant of an impact; bisections reach its last bit if need be ... */
+#define TO_ROOT 200
+/* ... and the number of faster steps before them. */
+#define QUICK 20
+/* Candidates for places: corners of both. */
+#define CANDIDATES (2 * MOST_CORNERS)
+
+/* Velocity of a particle at a place at t, m/s. */
+static void moves_at(const Disk *d, const Shape *a, double t, const Touch *at, double *v) {
+    double h = t - d->t;
+    v[0] = d->vx + W.gx * h - d->spin * (at->y - a->y);
+    v[1] = d->vy + W.gy * h + d->spin * (at->x - a->x);
+}
+
+/* Speed at which the gap at a place closes at t, m/s. */
+static double closes_at(int i, int j, const Shape *a, const Shape *b, double t, const Touch *at) {
+    double u[3], v[3];
+    moves_at(W.disks + i, a, t, at, u);
+    if (j >= 0) moves_at(W.disks + j, b, t, at, v);
+    else carried(b->s, at->x, at->y, v);
+    return (v[0] - u[0]) * at->nx + (v[1] - u[1]) * at->ny;
+}
+
+/* Bound on the speed at which two approach each other at any place within a span, m/s; INFINITY if they cannot meet in
+   it. */
+RARELY double fastest_of(int i, int j, double t, double span) {
+    const Disk *d = W.disks + i, *o = W.disks + MAX(j, 0);
+    double h = t - d->t, x = d->x + (d->vx + 0.5 * W.gx * h) * h, y = d->y + (d->vy + 0.5 * W.gy * h) * h, nx, ny;
+    double u = d->vx + W.gx * h, v = d->vy + W.gy * h, turns = fabs(d->spin) * d->radius;
+    if (j < 0) {
+        const Surface *s = surface_at(-1 - j, t);
+        double then = square(u + W.gx * span) + square(v + W.gy * span);
+        double most = sqrt(MAX(u * u + v * v, then)) + turns + (stirs(s) ? s->fastest : 0);
+        return gap_to(s, x, y, d->radius, &nx, &ny) > most * span ? INFINITY : most;
+    }
+    h = t - o->t;
+    x -= o->x + (o->vx + 0.5 * W.gx * h) * h;
+    y -= o->y + (o->vy + 0.5 * W.gy * h) * h;
+    u -= o->vx + W.gx * h;
+    v -= o->vy + W.gy * h;
+    double speed = sqrt(u * u + v * v);
+    if (x * x + y * y > square(d->radius + o->radius + speed * span)) return INFINITY;
+    return speed + turns + fabs(o->spin) * o->radius;
+}
+
+/* The gap of a candidate, m. For a corner of a polygon, or an end of a surface, its distance outside of all edges; for a
+   corner on a segment that on its side; for something round that at the place where it is. */
+static double gap_at(const Shape *a, const Shape *b, double near, Touch *at) {
+    int m = at->which - a->count;
+    if (m < 0 && b->round < 0 && !b->s) furthest(b, a->p[at->which], &at->gap);
+    else if (m >= 0 && m != b->round) furthest(a, b->p[m], &at->gap);
+    else if (m < 0 && b->s && b->s->shape == SEGMENT) fill_in(a, b, at);
+    else find_place(a, b, near, at);
+    return at->gap;
+}
+
+/* Lower bound, m, of the gap that a corner of one polygon has to the other within a span, from its gap and speed at an
+   edge at t. The rotation of both accelerates it by at most `bends`, m/s2. */
+static double least_gap(int i, int j, const Shape *a, const Shape *b, double t, double span, double bends, Touch *at) {
+    double off;
+    at->on = at->which < a->count ? furthest(b, a->p[at->which], &off) : furthest(a, b->p[at->which - a->count], &off);
+    fill_in(a, b, at);
+    return at->gap - (closes_at(i, j, a, b, t, at) + 0.5 * bends * span) * span;
+}
+
+/* The instant within (low, high] at which the gap of a candidate closes, from `above` 0 to `below`. False position with
+   the Illinois rule, which halves the value at an end that stays, then bisection, until at a speed of `most` the way from
+   end to end is as small as the rounding of a place. The gap itself doesn't tell: of a corner that comes down beside an
+   edge in line with its own it stays at 0, however deep the corner is. */
+static double root_of(int i, int j, Touch *at, double low, double high, double above, double below, double most) {
+    double near = TOUCH * inner_of(i, j), rounding = EPS * (fabs(W.disks[i].x) + fabs(W.disks[i].y));
+    for (int n = 0, side = 0; n < TO_ROOT && (high - low) * most > rounding; n++) {
+        double middle = n < QUICK ? high + (high - low) * below / (above - below) : 0.5 * (low + high);
+        if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
+        if (!(middle > low && middle < high)) break;
+        Shape a = shape_of(i, middle), b = shape_of(j, middle);
+        double gap = gap_at(&a, &b, near, at);
+        if (gap > 0) {
+            low = middle;
+            above = gap;
+            if (side > 0) below *= 0.5;
+            side = 1;
+        } else {
+            high = middle;
+            below = gap;
+            if (side < 0) above *= 0.5;
+            side = -1;
+        }
+    }
+    return high;
+}
+
+/* The instant within (low, high] at which two polygons begin to overlap. */
+static double overlap_at(int i, int j, double low, double high) {
+    for (;;) {
+        double middle = 0.5 * (low + high);
+        if (!(middle > low && middle < high)) return high;
+        Shape a = shape_of(i, middle), b = shape_of(j, middle);
+        if (are_apart(&a, &b, 0)) low = middle;
+        else high = middle;
+    }
+}
+
+/* Whether a place at which two touch at t closes faster than `soft`. */
+static int closes_faster(int i, int j, Shape *a, Shape *b, double t, double within, double soft) {
+    Touch places[MOST_TOUCHES];
+    int count = list_places_of(a, b, TOUCH * inner_of(i, j), within, places);
+    for (int n = 0; n < count; n++)
+        if (closes_at(i, j, a, b, t, places + n) > soft) return 1;
+    return 0;
+}
+
+/* The instant within (low, high] from which on a touching place closes faster than `soft`, for a particle that rolls from
+   a corner onto an edge round a disk or an arc: it touches all the time. */
+static double rolls_at(int i, int j, double low, double high, double soft) {
+    for (int n = 0; n < QUICK; n++) {
+        double middle = 0.5 * (low + high);
+        Shape a = shape_of(i, middle), b = shape_of(j, middle);
+        if (closes_faster(i, j, &a, &b, middle, TOUCHING * inner_of(i, j), soft)) high = middle;
+        else low = middle;
+    }
+    return high;
+}
+
+/* The instant between two times at which particle i, which has corners, meets j faster than `soft`, or INFINITY; `most`
+   is the bound of `fastest_of`. */
+double meet_corners(int i, int j, double from, double until, double most, double soft) {
+    double span = until - from, small = inner_of(i, j), near = TOUCH * small;
+    double h = 0, first = INFINITY, gap[CANDIDATES];
+    int sides[MOST_CORNERS], in_reach[CANDIDATES], many = 0, closed, clear;
+    if (!(span > 0) || most <= soft) return INFINITY;
+    Shape a = shape_of(i, from), b = shape_of(j, from);
+    int count = a.count + b.count, on_segment = b.s && b.s->shape == SEGMENT, both = !b.s && b.round < 0;
+    double turn = both ? fabs(W.disks[i].spin) + fabs(W.disks[j].spin) : 0;
+    double bends = turn * (2 * most + 4 * turn * MAX(W.disks[i].radius, both ? W.disks[j].radius : 0));
+    if (are_apart(&a, &b, most * span + near)) return INFINITY;
+    closed = both && overlap(&a, &b);
+    clear = both && !closed;
+    /* On something round all corners are one candidate: when one leaves, the next may arrive. */
+    int rolls = b.round >= 0 && span * (fabs(W.disks[i].spin) + (j < 0 ? 0 : fabs(W.disks[j].spin))) > ROLLS;
+    for (int c = 0; c < count; c++) {
+        Touch now = {.which = c};
+        /* Its side does not change within a step. */
+        if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c, near);
+        gap[c] = gap_at(&a, &b, near, &now);
+        closed |= gap[c] <= 0;
+        if (gap[c] > most * span) continue;
+        /* A closed gap to another polygon closes no faster than is left to the next step; on a surface it may, since
+           surfaces may turn. */
+        if (!both || (gap[c] > 0 && least_gap(i, j, &a, &b, from, span, bends, &now) <= 0)) in_reach[many++] = c;
+    }
+    if (closed && closes_faster(i, j, &a, &b, from, 0, soft)) return from;
+    while (h < span && first == INFINITY && many) {
+        double least = INFINITY, last = from + h;
+        for (int n = 0; n < many; n++) {
+            if (gap[in_reach[n]] > 0) least = MIN(least, gap[in_reach[n]]);
+            else if (rolls && in_reach[n] == a.count + b.round) least = 0;
+        }
+        h = MIN(h + MAX(least / most, span / STRIDES), span);
+        double t = h < span ? from + h : until;
+        Shape a2 = shape_of(i, t), b2 = shape_of(j, t);
+        for (int n = 0; n < many; n++) {
+            int c = in_reach[n];
+            Touch now = {.which = c};
+            if (on_segment && c < a.count) now.on = sides[c];
+            double before = gap[c];
+            /* The surface may have been moved to the time of another root. */
+            if (j < 0) b2.s = surface_at(-1 - j, t);
+            gap[c] = gap_at(&a2, &b2, near, &now);
+            if (before <= 0 && gap[c] < before && c - a.count == b.round
+                && closes_faster(i, j, &a2, &b2, t, TOUCHING * small, soft))
+                first = MIN(first, rolls_at(i, j, last, t, soft));
+            if (!(before > 0 && gap[c] <= 0)) continue;
+            double then = root_of(i, j, &now, last, t, before, gap[c], most);
+            if (then >= first) continue;
+            Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
+            if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
+        }
+        /* A tip that passes through a tip within a stride is inside nothing after it, but edges cross then. */
+        if (!clear || first < INFINITY || most * (t - last) < near) continue;
+        clear = are_apart(&a2, &b2, 0);
+        if (clear) continue;
+        double then = overlap_at(i, j, last, t);
+        Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
+        if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
+    }
+    return first;
+}

@@ -1,0 +1,399 @@
+/* Particles with corners at an instant: where they are, how far they are apart, and at which places they touch. */
+
+#include <string.h>
+#include "shape.h"
+#include "trig.h"
+
+/* Cosine of the angle between edge and surface; with a larger one, a corner near the end of a surface is on it. */
+#define FLAT 0.9
+/* Share of what counts as near; a smaller overlap may be rounding. */
+#define DEEP 0.2
+/* The same for a place beyond an end. */
+#define ROUNDED 1e-6
+
+/* Cosine and sine of the angle of a particle, cached for two angles of each. */
+const double *pose_of(int j, double turned, int later) {
+    double *pose = W.poses + 6 * j + 3 * later;
+    if (pose[0] == turned && pose[1] != pose[2]) return pose + 1;
+    pose[0] = turned;
+    sin_cos(fabs(turned) < 1e6 ? turned : fmod(turned, 2 * PI), pose + 2, pose + 1);
+    return pose + 1;
+}
+
+Shape shape_of(int j, double t) {
+    /* Only the fields that it has are set. */
+    Shape out;
+    out.round = -1;
+    out.count = 0;
+    out.s = 0;
+    if (j < 0) {
+        const Surface *s = out.s = surface_at(-1 - j, t);
+        if (s->shape != CIRCLE) {
+            memcpy(out.p, s->end, sizeof s->end);
+            out.count = 2;
+        }
+        if (s->shape == SEGMENT) return out;
+        out.p[out.count][0] = s->x;
+        out.p[out.count][1] = s->y;
+        out.radius = s->radius;
+        out.round = out.count++;
+        return out;
+    }
+    const Disk *d = W.disks + j;
+    double h = t - d->t;
+    out.x = d->x + (d->vx + 0.5 * W.gx * h) * h;
+    out.y = d->y + (d->vy + 0.5 * W.gy * h) * h;
+    out.count = d->corners;
+    if (d->corners) {
+        const double *pose = pose_of(j, d->turned + d->spin * h, h != 0), *corner = W.outlines + 2 * d->outline;
+        const double *edge = out.edges = W.edges + 3 * d->outline;
+        double c = pose[0], s = pose[1];
+        for (int n = 0; n < d->corners; n++, corner += 2, edge += 3) {
+            out.p[n][0] = out.x + c * corner[0] - s * corner[1];
+            out.p[n][1] = out.y + s * corner[0] + c * corner[1];
+            out.n[n][0] = c * edge[0] - s * edge[1];
+            out.n[n][1] = s * edge[0] + c * edge[1];
+        }
+        return out;
+    }
+    out.p[0][0] = out.x;
+    out.p[0][1] = out.y;
+    out.radius = d->radius;
+    out.round = 0;
+    out.count = 1;
+    return out;
+}
+
+/* Distance of a whole shape outside of an edge, m; negative if it is partly inside. */
+static double clear_of(const Shape *a, int edge, const Shape *b) {
+    double least = INFINITY;
+    for (int n = 0; n < b->count; n++)
+        least = MIN(least, off_edge(a, edge, b->p[n]) - (n == b->round ? b->radius : 0));
+    return least;
+}
+
+/* The edge that a corner of `b` is on. If the corner is outside of `a` by `near`, that is the edge that it is furthest
+   outside of. Else it is the edge that separates the two most: with another one, a particle that overlaps by more than
+   the distance of its corners would be pressed sideways. At an end of a surface, the line by which the surface continues
+   from there, as long as the inner radius of `a`, counts for that: so a corner that slides off the end stays on the edge
+   on which it came. */
+static int edge_under(const Shape *a, const Shape *b, const double *q, double near) {
+    double off, best = -INFINITY, on = near / TOUCH;
+    int found = furthest(a, q, &off);
+    if (off >= near) return found;
+    if (!b->s) return a->facing;
+    Shape end;
+    end.count = 2;
+    end.round = -1;
+    double x = b->s->tx, y = b->s->ty;
+    if (b->s->shape == ARC) {
+        x = (q[1] - b->s->y) / b->radius;
+        y = (b->s->x - q[0]) / b->radius;
+        if (x * b->s->tx + y * b->s->ty < 0) on = -on;
+    } else if (q != b->p[0]) on = -on;
+    memcpy(end.p[0], q, sizeof end.p[0]);
+    end.p[1][0] = q[0] + on * x;
+    end.p[1][1] = q[1] + on * y;
+    for (int e = 0; e < a->count; e++) {
+        double clear = clear_of(a, e, &end);
+        if (clear <= best) continue;
+        best = clear;
+        found = e;
+    }
+    return found;
+}
+
+/* Whether two polygons are apart by more than `by` along an edge of the first one. If not, note the edge that separates
+   them most. */
+static int are_apart_along(Shape *a, const Shape *b, double by) {
+    double best = -INFINITY;
+    for (int e = 0; e < a->count; e++) {
+        /* The particle as a whole is out by less than its centre is. */
+        if (!b->s && off_edge(a, e, &b->x) < best) continue;
+        double clear = clear_of(a, e, b);
+        if (clear > by) return 1;
+        if (clear <= best) continue;
+        best = clear;
+        a->facing = e;
+    }
+    return 0;
+}
+
+/* Whether a polygon and something else are apart by more than `by`: along an edge of either, or inside an arc. */
+int are_apart(Shape *a, Shape *b, double by) {
+    if (are_apart_along(a, b, by)) return 1;
+    if (!b->s) return b->round < 0 && are_apart_along(b, a, by);
+    double low = INFINITY, high = -INFINITY;
+    for (int n = 0; n < a->count; n++) {
+        double x = a->p[n][0] - b->s->x, y = a->p[n][1] - b->s->y;
+        double off = b->round < 0 ? y * b->s->tx - x * b->s->ty : x * x + y * y;
+        low = MIN(low, off);
+        high = MAX(high, off);
+    }
+    if (b->round < 0) return low > by || high < -by;
+    return by < b->radius && high < square(b->radius - by);
+}
+
+/* Fill in a place from its candidate `which` (corners of `a`, then points of `b`) and from what this is on: the number of
+   an edge; for a corner on a segment the side, 1 or -1; on an arc 0, the inside; for a point with a radius also -1 -
+   corner of `a`. */
+void fill_in(const Shape *a, const Shape *b, Touch *t) {
+    double n[2];
+    if (t->which < a->count) {
+        const double *q = a->p[t->which];
+        t->x = q[0];
+        t->y = q[1];
+        if (!b->s) {
+            out_of(b, t->on, n);
+            t->gap = off_edge(b, t->on, q);
+        } else if (b->s->shape == SEGMENT) {
+            n[0] = -t->on * b->s->ty;
+            n[1] = t->on * b->s->tx;
+            t->gap = (q[0] - b->s->x) * n[0] + (q[1] - b->s->y) * n[1];
+        } else {
+            double x = b->s->x - q[0], y = b->s->y - q[1], d = sqrt(x * x + y * y);
+            n[0] = x / d;
+            n[1] = y / d;
+            t->gap = b->radius - d;
+        }
+    } else {
+        int m = t->which - a->count;
+        const double *q = b->p[m];
+        double r = m == b->round ? b->radius : 0;
+        if (t->on >= 0) {
+            out_of(a, t->on, n);
+            t->gap = off_edge(a, t->on, q) - r;
+            n[0] = -n[0];
+            n[1] = -n[1];
+        } else {
+            double x = a->p[-1 - t->on][0] - q[0], y = a->p[-1 - t->on][1] - q[1], d = sqrt(x * x + y * y);
+            t->gap = d - r;
+            n[0] = x / d;
+            n[1] = y / d;
+        }
+        t->x = q[0] + r * n[0];
+        t->y = q[1] + r * n[1];
+    }
+    t->nx = n[0];
+    t->ny = n[1];
+}
+
+/* The side of a segment that a corner is on: usually its own. If the line from the corner to the centre, which is inside
+   the particle, crosses the segment, the corner has passed through, and its side is that of the centre. This also holds
+   up to `near` beyond an end at which another segment continues to that side, since a corner that overlaps two walls is
+   beyond the end of each. */
+int side_of(const Shape *a, const Surface *s, int corner, double near) {
+    double x = a->p[corner][0] - s->x, y = a->p[corner][1] - s->y, u = a->x - s->x, v = a->y - s->y;
+    double off = y * s->tx - x * s->ty, mid = v * s->tx - u * s->ty, both = fabs(off) + fabs(mid);
+    int own = off >= 0 ? 1 : -1, centre = mid >= 0 ? 1 : -1;
+    if (own == centre) return own;
+    double cut = ((x * s->tx + y * s->ty) * fabs(mid) + (u * s->tx + v * s->ty) * fabs(off)) / both;
+    int hollow = centre > 0 ? 1 : 2, sunk = fabs(off) <= near;
+    double low = sunk && (s->hollows[0] & hollow) ? -near : 0, high = sunk && (s->hollows[1] & hollow) ? near : 0;
+    return cut >= low && cut <= s->length + high ? centre : own;
+}
+
+/* Whether a point of a shape is on the inside of an arc: its own position decides, unless the line from it to the centre,
+   which is inside the shape, crosses the arc once. Outside the circle are both where a shape lies over the opening: then
+   the line may enter the circle through the arc, and leave it through the opening. */
+static int is_inside(const Shape *a, const Surface *s, double px, double py) {
+    double x = px - s->x, y = py - s->y, u = a->x - s->x, v = a->y - s->y;
+    double off = x * x + y * y - square(s->radius);
+    int own = off <= 0, centre = u * u + v * v < square(s->radius), result = own;
+    if (own && centre) return own;
+    u -= x;
+    v -= y;
+    double whole = u * u + v * v, half = x * u + y * v, root = half * half - whole * off;
+    if (own == centre && !(half < 0 && whole > -half && root > 0)) return own;
+    root = sqrt(root);
+    for (int side = own ? 1 : -1; side <= (centre ? -1 : 1); side += 2) {
+        double cut = (side * root - half) / whole;
+        if (s->shape == CIRCLE || (x + cut * u) * s->tx + (y + cut * v) * s->ty >= s->cos_half * s->radius) result = !result;
+    }
+    return result;
+}
+
+/* How far beyond an end of a segment a corner may be and still be on the segment: only rounding, unless the segment
+   continues smoothly. */
+static double past_end(const Surface *s, int end, double near) { return mate_of(s, end) < 0 ? ROUNDED * near : near; }
+
+/* Find what a candidate is on, and fill in its place; return 0 if it doesn't touch there. */
+int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
+    double off, n[2];
+    if (t->which < a->count) {
+        const double *q = a->p[t->which];
+        if (b->s && b->s->shape == SEGMENT) {
+            double along = (q[0] - b->s->x) * b->s->tx + (q[1] - b->s->y) * b->s->ty;
+            t->on = side_of(a, b->s, t->which, near);
+            fill_in(a, b, t);
+            return along >= -past_end(b->s, 0, near) && along <= b->s->length + past_end(b->s, 1, near);
+        }
+        if (b->s) {
+            double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);
+            t->on = 0;
+            fill_in(a, b, t);
+            if (!is_inside(a, b->s, q[0], q[1])) return 0;
+            return b->s->shape == CIRCLE || x * b->s->tx + y * b->s->ty >= b->s->cos_half * d;
+        }
+        if (b->round >= 0) {
+            t->gap = INFINITY;
+            return 0;
+        }
+        t->on = edge_under(b, a, q, near);
+        fill_in(a, b, t);
+        double length = out_of(b, t->on, n), along = n[0] * (q[1] - b->p[t->on][1]) - n[1] * (q[0] - b->p[t->on][0]);
+        return along >= -near && along <= length + near;
+    }
+    int m = t->which - a->count;
+    const double *q = b->p[m];
+    double best = INFINITY;
+    if (m != b->round) {
+        t->on = edge_under(a, b, q, near);
+        double length = out_of(a, t->on, n), along = n[0] * (q[1] - a->p[t->on][1]) - n[1] * (q[0] - a->p[t->on][0]);
+        fill_in(a, b, t);
+        return along >= 0 && along <= length && !(b->s && mate_of(b->s, m) >= 0);
+    }
+    t->on = furthest(a, q, &off);
+    for (int e = 0; e < a->count && off > 0; e++) {
+        double length = out_of(a, e, n), x = q[0] - a->p[e][0], y = q[1] - a->p[e][1];
+        double along = n[0] * y - n[1] * x, away = x * n[0] + y * n[1];
+        int inside = along >= 0 && along <= length;
+        double d = inside ? fabs(away) : sqrt(x * x + y * y);
+        if (d >= best || (inside && away < 0)) continue;
+        best = d;
+        t->on = inside ? e : -1 - e;
+    }
+    fill_in(a, b, t);
+    if (!b->s) return 1;
+    if (is_inside(a, b->s, t->x + t->gap * t->nx, t->y + t->gap * t->ny)) return 0;
+    return b->s->shape == CIRCLE || t->nx * b->s->tx + t->ny * b->s->ty >= b->s->cos_half;
+}
+
+double inner_of(int i, int j) { return j < 0 ? W.disks[i].inner : MIN(W.disks[i].inner, W.disks[j].inner); }
+
+/* Whether two polygons overlap, after `are_apart` has found the edges that separate them most. */
+int overlap(const Shape *a, const Shape *b) {
+    return clear_of(a, a->facing, b) < 0 && clear_of(b, b->facing, a) < 0;
+}
+
+/* The place of two polygons that overlap although no corner is inside the other one: a tip has passed through a tip, and
+   only edges cross. It is the deepest corner at the edge that separates them most. */
+static void find_crossing(const Shape *a, const Shape *b, Touch *t) {
+    int own = clear_of(a, a->facing, b) >= clear_of(b, b->facing, a), deepest = 0;
+    const Shape *edge = own ? a : b, *other = own ? b : a;
+    for (int n = 1; n < other->count; n++)
+        if (off_edge(edge, edge->facing, other->p[n]) < off_edge(edge, edge->facing, other->p[deepest])) deepest = n;
+    t->which = own ? a->count + deepest : deepest;
+    t->on = edge->facing;
+    fill_in(a, b, t);
+}
+
+/* List the places at which a polygon and another shape have a gap below `within`, up to MOST_TOUCHES. */
+int list_places_of(Shape *a, Shape *b, double near, double within, Touch *list) {
+    int count = 0, both = !b->s && b->round < 0;
+    if (are_apart(a, b, within + near)) return 0;
+    for (int c = 0; c < a->count + b->count && count < MOST_TOUCHES; c++) {
+        Touch *now = list + count;
+        now->which = c;
+        /* On any edge its gap is at least as large. */
+        if (both && (c < a->count ? off_edge(b, b->facing, a->p[c]) : off_edge(a, a->facing, b->p[c - a->count])) > within)
+            continue;
+        if (!find_place(a, b, near, now) || now->gap > within) continue;
+        /* Near corners of both particles it may be inside by another edge, although the particles are apart. */
+        if (!b->s && now->gap < -DEEP * near && are_apart(a, b, 0)) continue;
+        int known = 0;
+        for (int n = 0; n < count && c >= a->count; n++) {
+            if (length_of(list[n].x - now->x, list[n].y - now->y) > near) continue;
+            if (c - a->count == b->round && list[n].nx * now->nx + list[n].ny * now->ny <= FLAT) continue;
+            known = 1;
+            /* A corner that slides off an end leaves on the edge that is on the end. */
+            if (b->s && b->round < 0 && now->gap <= 0) list[n] = *now;
+        }
+        count += !known;
+    }
+    if (!count && both && overlap(a, b)) find_crossing(a, b, list + count++);
+    for (int n = 0; n < count; n++) list[n].many = count;
+    return count;
+}
+
+/* The same for particle i, which has corners, and j at t; and the gaps of the places at `later`. */
+RARELY int list_touches(int i, int j, double t, double within, double later, Touch *list) {
+    double near = TOUCH * inner_of(i, j);
+    Shape a = shape_of(i, t), b = shape_of(j, t);
+    int count = list_places_of(&a, &b, near, within, list);
+    if (!(later > t) || !count) return count;
+    a = shape_of(i, later);
+    b = shape_of(j, later);
+    for (int n = 0; n < count; n++) {
+        Touch then = list[n];
+        /* Something round may move round a corner meanwhile. */
+        if (then.which - a.count == b.round) find_place(&a, &b, near, &then);
+        else fill_in(&a, &b, &then);
+        list[n].later = then.gap;
+    }
+    return count;
+}
+
+/* Distance between a shape and an arc, m, by separating axes: the circle of the arc, or the edges of the shape from the
+   part between the arc's ends. Negative if they overlap. */
+static double clear_of_arc(const Shape *a, const Surface *s) {
+    double far = 0, near = INFINITY, n[2], out;
+    const double centre[2] = {s->x, s->y};
+    for (int e = 0; e < a->count; e++) {
+        const double *p = a->p[e], *q = a->p[e + 1 < a->count ? e + 1 : 0];
+        double length = out_of(a, e, n), x = s->x - p[0], y = s->y - p[1], along = n[0] * y - n[1] * x;
+        double over = MIN(MAX(along, 0), length) / length;
+        near = MIN(near, hypot(x - over * (q[0] - p[0]), y - over * (q[1] - p[1])));
+        far = MAX(far, hypot(x, y));
+    }
+    furthest(a, centre, &out);
+    double clear = MAX(s->radius - far, (out > 0 ? near : 0) - s->radius);
+    for (int e = 0; e < a->count && s->shape == ARC; e++) {
+        out_of(a, e, n);
+        double least = MIN(off_edge(a, e, s->end), off_edge(a, e, s->end + 2));
+        if (-n[0] * s->tx - n[1] * s->ty >= s->cos_half) least = off_edge(a, e, centre) - s->radius;
+        clear = MAX(clear, least);
+    }
+    return clear;
+}
+
+/* Distance between a particle with corners, as it is at t but moved to (x, y), and a surface, m, over all separating
+   axes; negative if they overlap. */
+RARELY double clear_of_corners(const Disk *d, double x, double y, int k, double t) {
+    Shape a = shape_of((int)(d - W.disks), t), b = shape_of(-1 - k, t);
+    double low = INFINITY, high = -INFINITY, clear;
+    for (int n = 0; n < a.count; n++) {
+        a.p[n][0] += x - a.x;
+        a.p[n][1] += y - a.y;
+    }
+    if (b.s->shape != SEGMENT) return clear_of_arc(&a, b.s);
+    for (int n = 0; n < a.count; n++) {
+        double off = (a.p[n][1] - b.s->y) * b.s->tx - (a.p[n][0] - b.s->x) * b.s->ty;
+        low = MIN(low, off);
+        high = MAX(high, off);
+    }
+    clear = MAX(low, -high);
+    for (int e = 0; e < a.count; e++) clear = MAX(clear, clear_of(&a, e, &b));
+    return clear;
+}
+
+/* Whether two particles, one with corners, would overlap by more than `deep` at t with the first one moved to (x, y). */
+RARELY int would_overlap(int i, double x, double y, int j, double t, double deep) {
+    Shape a = shape_of(i, W.disks[i].t), b = shape_of(j, t);
+    double clear = -INFINITY;
+    for (int n = 0; n < a.count; n++) {
+        a.p[n][0] += x - a.x;
+        a.p[n][1] += y - a.y;
+    }
+    a.x = x;
+    a.y = y;
+    const Shape *one = a.round < 0 ? &a : &b, *other = a.round < 0 ? &b : &a;
+    if (other->round >= 0) {
+        Touch now = {.which = one->count};
+        find_place(one, other, 0, &now);
+        return now.gap < -deep;
+    }
+    for (int e = 0; e < a.count; e++) clear = MAX(clear, clear_of(&a, e, &b));
+    for (int e = 0; e < b.count; e++) clear = MAX(clear, clear_of(&b, e, &a));
+    return clear < -deep;
+}

@@ -1,7 +1,7 @@
 """Boxes and polygons in the contact engine, by closed forms; and against Pymunk."""
 
 from dataclasses import replace
-from math import atan2, cos, degrees, hypot, pi, sin, tan
+from math import atan2, cos, degrees, hypot, pi, sin, sqrt, tan
 
 import numpy as np
 import pytest
@@ -476,6 +476,23 @@ def poured(count, until):
         "run": {"until": until},
     })  # fmt: skip
     return recording, half, wide
+
+
+@pytest.mark.parametrize("spin", [2.0, 60.0])
+def test_steps_of_a_hundred_boxes_are_as_long_as_hops_of_the_fastest_corner_allow(spin):
+    """√(0.008 r / (g + ω² R)), inner radius r and outer R; of what hops by weight allow 0.7."""
+    r, outer = 0.005, 0.005 * sqrt(2.0)
+    tables = {
+        "particle": {"shape": "box", "size": [2.0 * r, 2.0 * r], "mass": 0.01, "spin": True},
+        "surface": [{"name": "floor", "from": [-1.0, 0.0], "to": [9.0, 0.0]}],
+        "stream": {"count": 100, "at": [0.0, 1.0], "to": [8.0, 1.0], "velocity": [0.0, 0.0],
+                   "omega": spin, "interact": True},
+        "run": {"until": 0.1},
+    }  # fmt: skip
+    steps = np.diff(run(tables).totals["t"])
+    longest = min(0.7 * sqrt(0.008 * r / G), sqrt(0.008 * r / (G + spin**2 * outer)))
+    assert np.median(steps) == pytest.approx(longest, rel=1e-9)
+    assert steps.max() <= longest * (1.0 + 1e-9)
 
 
 def test_a_tip_that_passes_a_tip_strikes_it():

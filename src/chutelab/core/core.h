@@ -339,6 +339,7 @@ int list_still(int i, int j, double h, const Contact **list, double *changes);
 void go_on_with(Contact *c, const Contact *last, double change, double h);
 double opens_by(const Contact *c);
 int lies_flat(int i, int k);
+void forget_places(void);
 int list_struck(int i, int j, double t, Contact *list);
 void strike_corners(int i, int j, double t);
 

@@ -14,6 +14,8 @@
 /* Distance, in radii of the inner circle, by which two particles of a crowd may move before their places are looked up
    again; the gap is then wrong by its square. */
 #define STILL 5e-4
+/* Number of pairs whose places are remembered during an impact and those that follow from it. */
+#define KNOWN 8
 
 /* Bound on the centripetal acceleration of a corner, m/s2. */
 double whirl_of(const Disk *d) { return d->corners ? d->spin * d->spin * d->radius : 0; }
@@ -24,7 +26,7 @@ double whirl_of(const Disk *d) { return d->corners ? d->spin * d->spin * d->radi
    1/kg. */
 static void take_levers(Contact *c, const Touch *t, double *rotation) {
     const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-    const double *pose = pose_of(c->i, a->turned, 0);
+    const double *pose = pose_of(c->i);
     double x = t->x - a->x, y = t->y - a->y, cosine = pose[0], sine = pose[1];
     c->own[0] = x * c->ny - y * c->nx;
     c->own[1] = -(x * c->nx + y * c->ny);
@@ -182,9 +184,34 @@ RARELY void go_on_with(Contact *c, const Contact *last, double change, double h)
 
 /* ------------------------------------------------------------------------------------------ impacts */
 
+/* Places of pairs within an impact and those that follow from it. Nothing moves at that instant, and a pair may be struck
+   several times. */
+typedef struct { Touch places[MOST_TOUCHES]; double t, within; int i, j, changes, count; } Known;
+static Known known[KNOWN];
+static int known_count;
+
+void forget_places(void) { known_count = 0; }
+
+/* `list_touches` at an instant, which for pairs is remembered. */
+static const Touch *places_at(int i, int j, double t, double within, int *count) {
+    int changes = W.disks[i].changes + (j < 0 ? 0 : W.disks[j].changes);
+    for (Known *k = known; k < known + MIN(known_count, KNOWN); k++) {
+        if (k->i != i || k->j != j || k->t != t || k->within != within || k->changes != changes) continue;
+        *count = k->count;
+        return k->places;
+    }
+    Known *k = known + known_count++ % KNOWN;
+    k->count = *count = list_touches(i, j, t, within, t, k->places);
+    k->t = t;
+    k->within = within;
+    k->i = i;
+    k->j = j;
+    k->changes = changes;
+    return k->places;
+}
+
 /* List the places at which two touch now as contacts: where a gap is closed, or where a contact lasts. */
 RARELY int list_struck(int i, int j, double t, Contact *list) {
-    Touch places[MOST_TOUCHES];
     double least = inner_of(i, j);
     int lasts = 0, count = 0;
     for (int link = W.disks[i].links; link >= 0; link = W.links[link]) {
@@ -195,11 +222,10 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
     /* A particle with joints is struck at the beginning of a step, if its impact would be just after it. */
     if (is_tied(i) || is_tied(j)) most = fastest_of(i, j, t, span);
     if (most < INFINITY) within = MAX(within, most * span);
-    int found = list_touches(i, j, t, within, t, places);
-    for (int n = 0; n < found; n++) {
-        Contact *c = list + count++;
-        describe_touch(c, i, j, places + n);
-        c->drift = 0;
+    const Touch *places = places_at(i, j, t, within, &count);
+    for (int n = 0; n < count; n++) {
+        describe_touch(list + n, i, j, places + n);
+        list[n].drift = 0;
     }
     return count;
 }

@@ -69,6 +69,14 @@ double soft_approach(const Disk *d, double radius) {
     return GRAZE * sqrt(d->vx * d->vx + d->vy * d->vy);
 }
 
+/* The approach that is left, m/s, after more than `many` impacts in a step. */
+static double grown(double least, int impacts, int many, double skip) {
+    if (impacts <= many) return least;
+    double most = skip * (MOST_SKIP / SKIP) * (impacts > STUCK ? pow(GROW, MIN(impacts - STUCK, 1000)) : 1);
+    for (int n = MIN(impacts - many, 1000); n > 0 && skip < most && least < most; n--) skip *= GROW;
+    return MAX(least, MIN(skip, most));
+}
+
 /* Approach up to which a contact is left to the next step, m/s. A disk that lies on a surface comes back to it at the end
    of each step, as fast as gravity makes it in a step, and inside an arc as fast as the curved path does. Of an approach
    with a deep overlap hardly anything is left. */
@@ -92,11 +100,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
         least = MAX(least, back);
     }
     /* Surfaces do not give way: with them the bound grows only if jams do not help. */
-    int many = sunk ? STUCK : surface >= 0 ? 2 * JAM : MANY;
-    if (impacts <= many) return least;
-    double most = skip * (MOST_SKIP / SKIP) * (impacts > STUCK ? pow(GROW, MIN(impacts - STUCK, 1000)) : 1);
-    for (int n = MIN(impacts - many, 1000); n > 0 && skip < most; n--) skip *= GROW;
-    return MAX(least, MIN(skip, most));
+    return grown(least, impacts, sunk ? STUCK : surface >= 0 ? 2 * JAM : MANY, skip);
 }
 
 /* Approach up to which two particles of a crowd, of which one is supported, are left to the next step at t, m/s: until the
@@ -115,9 +119,11 @@ static double left_between(const Disk *a, const Disk *b, double radius, double g
 
 /* The same for two particles of which one has corners. */
 static double left_by_corners(const Disk *a, const Disk *b, int impacts, double t) {
-    double small = MIN(a->inner, b->inner), least = MAX(left_over(a, impacts, -1, small, 0, t), left_over(b, impacts, -1, small, 0, t));
-    if (are_few(W.contact_count)) return least;
-    return MAX(least, left_late(a, b, LATE_CORNERS * small, LATEST * W.soft, t));
+    double small = MIN(a->inner, b->inner), back = 1.000001 * (W.g + MAX(whirl_of(a), whirl_of(b))) * W.step;
+    double least = MAX(MAX(soft_approach(a, small), back), MAX(a->open, b->open));
+    if (a->halved || b->halved) least = MAX(least, LEFT_BY_TURNS * W.pace);
+    if (!are_few(W.contact_count)) least = MAX(least, left_late(a, b, LATE_CORNERS * small, LATEST * W.soft, t));
+    return grown(least, impacts, MANY, W.skip * small);
 }
 
 /* When particle i meets j, of which one has corners, between a time and the end of the step. */
@@ -738,6 +744,7 @@ void shock(int i, int j, double t) {
     int head = 0, tail = 0, budget = SHOCKS * W.contact_count;
     W.moved_count = W.woken = 0;
     W.shocks++;
+    if (W.outline_count) forget_places();
     W.now = t;
     strike(i, j, t);
     enqueue(i, &tail);

@@ -459,7 +459,7 @@ static double opened(double t) {
         double x = at[2 * i], y = at[2 * i + 1], r = L.bodies[i].radius;
         for (int k = n + 1; k < count && at[2 * there[k]] <= x + 2 * L.largest; k++) {
             int j = there[k];
-            double depth = r + L.bodies[j].radius - hypot(at[2 * j] - x, at[2 * j + 1] - y);
+            double depth = r + L.bodies[j].radius - length_of(at[2 * j] - x, at[2 * j + 1] - y);
             sum += sum_opened(depth, MIN(r, L.bodies[j].radius), step);
         }
         for (int k = 0; k < L.piece_count; k++) {

@@ -398,7 +398,7 @@ typedef struct {
     Joint *joints;
     double *outlines;    /* [in] (outline_count, 2) corners round the centroid, counterclockwise, kind by kind, m */
     double *edges;       /* (outline_count, 3) unit vector out of the edge that begins at a corner, and its length, m */
-    double *poses;       /* (disks, 2, 3) angle, cosine and sine of each, now and later in a step */
+    double *poses;       /* (disks, 3) angle, cosine and sine of each */
     JointRow *joint_rows;
     double *joint_matrix; /* (joint rows, joint rows) */
     /* arrays that `prepare` reserves */

@@ -16,7 +16,7 @@ World W;
 /* A crowd of which more than the share MANY_DEEP of the contacts are deeper than DEEP radii as a step begins takes shorter
    steps, down to LEAST_EASE of what hops allow: after each such step by SHORTEN, after others longer by LENGTHEN. Steps
    that no scene asks for are at most CHOSEN of what hops allow, or the usual one: with longer ones walls bear more of what
-   fills a silo. */
+   fills a silo. The hops of corners that rotate have no such limit, as they are those of a few. */
 #define DEEP 4.5e-3
 #define MANY_DEEP 0.01
 #define LEAST_EASE 0.5
@@ -449,14 +449,15 @@ static int begin_step(void) {
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
     if (W.total_count >= W.total_room) return FULL_TOTALS;
     if (W.hinges && W.swing_count + 4 * W.mover_count > W.swing_room) return FULL_SWINGS;
-    double next = set_gates(W.t), stride = 0, h = hop_time(W.disks + W.smallest, W.g + W.haste);
+    double next = set_gates(W.t), stride = 0, press = W.g + W.haste, h = hop_time(W.disks + W.smallest, press), whirled = h;
     for (int i = W.low; i < W.high && W.outline_count; i++) {
         const Disk *d = W.disks + i;
-        double press = W.g + W.haste + (has_corners(d) && d->mode == FREE ? whirl_of(d) : 0);
         h = MIN(h, hop_time(d, press));
+        if (has_corners(d) && d->mode == FREE) whirled = MIN(whirled, hop_time(d, press + whirl_of(d)));
     }
     W.easiest = W.chosen > 0 ? MIN(MAX(CHOSEN, W.chosen / h), 1) : 1;
-    h = MIN(MIN(W.ease, W.easiest) * h, W.dt);
+    double share = MIN(W.ease, W.easiest);
+    h = MIN(MIN(share * h, share / W.easiest * whirled), W.dt);
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     if (W.hinges) h = hinge_step(h);
     W.usual = h;

@@ -56,8 +56,8 @@ RARELY double fastest_of(int i, int j, double t, double span) {
    corner on a segment that on its side; for something round that at the place where it is. */
 static double gap_at(const Shape *a, const Shape *b, double near, Touch *at) {
     int m = at->which - a->count;
-    if (m < 0 && b->round < 0 && !b->s) furthest(b, a->p[at->which], &at->gap);
-    else if (m >= 0 && m != b->round) furthest(a, b->p[m], &at->gap);
+    if (m < 0 && b->round < 0 && !b->s) at->gap = outside(b, a->p[at->which]);
+    else if (m >= 0 && m != b->round) at->gap = outside(a, b->p[m]);
     else if (m < 0 && b->s && b->s->shape == SEGMENT) fill_in(a, b, at);
     else find_place(a, b, near, at);
     return at->gap;
@@ -72,10 +72,58 @@ static double least_gap(int i, int j, const Shape *a, const Shape *b, double t, 
     return at->gap - (closes_at(i, j, a, b, t, at) + 0.5 * bends * span) * span;
 }
 
-/* The instant within (low, high] at which the gap of a candidate closes, from `above` 0 to `below`. False position with
-   the Illinois rule, which halves the value at an end that stays, then bisection, until at a speed of `most` the way from
-   end to end is as small as the rounding of a place. The gap itself doesn't tell: of a corner that comes down beside an
-   edge in line with its own it stays at 0, however deep the corner is. */
+/* The gap of a corner of polygon i outside of polygon j at t, m, and the speed at which it closes. This is `gap_at` without
+   whole shapes, in the frame of j. */
+static double corner_gap(int i, int corner, int j, double t, double *closes) {
+    const Disk *d = W.disks + i, *o = W.disks + j;
+    const double *at = W.outlines + 2 * (d->outline + corner), *point = W.outlines + 2 * o->outline;
+    const double *edge = W.edges + 3 * o->outline, *best = edge;
+    double h = t - d->t, k = t - o->t, pose[2], other[2], gap = -INFINITY;
+    turn_pose(i, d->spin * h, pose);
+    turn_pose(j, o->spin * k, other);
+    double x = pose[0] * at[0] - pose[1] * at[1], y = pose[1] * at[0] + pose[0] * at[1];
+    double u = d->vx + W.gx * h - o->vx - W.gx * k - d->spin * y, v = d->vy + W.gy * h - o->vy - W.gy * k + d->spin * x;
+    x += d->x + (d->vx + 0.5 * W.gx * h) * h - (o->x + (o->vx + 0.5 * W.gx * k) * k);
+    y += d->y + (d->vy + 0.5 * W.gy * h) * h - (o->y + (o->vy + 0.5 * W.gy * k) * k);
+    u += o->spin * y;
+    v -= o->spin * x;
+    double along = other[0] * x + other[1] * y, across = other[0] * y - other[1] * x;
+    for (int n = 0; n < o->corners; n++, point += 2, edge += 3) {
+        double off = (along - point[0]) * edge[0] + (across - point[1]) * edge[1];
+        if (off <= gap) continue;
+        gap = off;
+        best = edge;
+    }
+    *closes = -(best[0] * (other[0] * u + other[1] * v) + best[1] * (other[0] * v - other[1] * u));
+    return gap;
+}
+
+/* The same for a candidate of two polygons; `count` is the number of corners of the first one. */
+static double candidate_gap(int i, int j, int count, int which, double t, double *closes) {
+    return which < count ? corner_gap(i, which, j, t, closes) : corner_gap(j, which - count, i, t, closes);
+}
+
+/* The instant within (low, high] at which the gap of a corner of a polygon to another one closes, from `above` 0 to `below`,
+   by Newton's method. Each step goes a little beyond the root, so that the root is between the last two; the search ends when
+   the way from one to the other at a speed of `most` is as small as the rounding of a place. */
+static double corner_root(int i, int j, int which, double low, double high, double above, double below, double most) {
+    double rounding = EPS * (fabs(W.disks[i].x) + fabs(W.disks[i].y)), more = MAX(0.25 * rounding / most, EPS * high), closes;
+    double t = high + (high - low) * below / (above - below);
+    for (int n = 0; n < TO_ROOT && (high - low) * most > rounding; n++) {
+        if (n >= QUICK || !(t > low && t < high)) t = 0.5 * (low + high);
+        if (!(t > low && t < high)) break;
+        double gap = candidate_gap(i, j, W.disks[i].corners, which, t, &closes);
+        if (gap > 0) low = t;
+        else high = t;
+        t += gap / closes + (gap > 0 ? more : -more);
+        if (n >= 2) more *= 4;
+    }
+    return high;
+}
+
+/* The same for any other candidate, by false position with the Illinois rule, which halves the value at an end that stays,
+   then by bisection. The gap itself doesn't tell how near the root is: of a corner that comes down beside an edge in line with
+   its own it stays at 0, however deep the corner is. */
 static double root_of(int i, int j, Touch *at, double low, double high, double above, double below, double most) {
     double near = TOUCH * inner_of(i, j), rounding = EPS * (fabs(W.disks[i].x) + fabs(W.disks[i].y));
     for (int n = 0, side = 0; n < TO_ROOT && (high - low) * most > rounding; n++) {
@@ -119,6 +167,21 @@ static int closes_faster(int i, int j, Shape *a, Shape *b, double t, double with
     return 0;
 }
 
+/* Whether a corner of one polygon that is inside the other, or may be, moves faster than `soft` relative to it at t. Else no
+   gap that is closed closes faster. */
+static int may_close(int i, int j, const Shape *a, const Shape *b, double t, double soft) {
+    for (int c = 0; c < a->count + b->count; c++) {
+        const double *q = c < a->count ? a->p[c] : b->p[c - a->count];
+        Touch at = {.x = q[0], .y = q[1]};
+        double u[2], v[2];
+        if ((c < a->count ? off_edge(b, b->facing, q) : off_edge(a, a->facing, q)) > 0) continue;
+        moves_at(W.disks + i, a, t, &at, u);
+        moves_at(W.disks + j, b, t, &at, v);
+        if (!(square(u[0] - v[0]) + square(u[1] - v[1]) <= square(soft))) return 1;
+    }
+    return 0;
+}
+
 /* The instant within (low, high] from which on a touching place closes faster than `soft`, for a particle that rolls from
    a corner onto an edge round a disk or an arc: it touches all the time. */
 static double rolls_at(int i, int j, double low, double high, double soft) {
@@ -149,6 +212,9 @@ double meet_corners(int i, int j, double from, double until, double most, double
     int rolls = b.round >= 0 && span * (fabs(W.disks[i].spin) + (j < 0 ? 0 : fabs(W.disks[j].spin))) > ROLLS;
     for (int c = 0; c < count; c++) {
         Touch now = {.which = c};
+        /* On any edge its gap is at least as large. */
+        if (both && (c < a.count ? off_edge(&b, b.facing, a.p[c]) : off_edge(&a, a.facing, b.p[c - a.count])) > most * span)
+            continue;
         /* Its side does not change within a step. */
         if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c, near);
         gap[c] = gap_at(&a, &b, near, &now);
@@ -158,7 +224,7 @@ double meet_corners(int i, int j, double from, double until, double most, double
            surfaces may turn. */
         if (!both || (gap[c] > 0 && least_gap(i, j, &a, &b, from, span, bends, &now) <= 0)) in_reach[many++] = c;
     }
-    if (closed && closes_faster(i, j, &a, &b, from, 0, soft)) return from;
+    if (closed && (!both || may_close(i, j, &a, &b, from, soft)) && closes_faster(i, j, &a, &b, from, 0, soft)) return from;
     while (h < span && first == INFINITY && many) {
         double least = INFINITY, last = from + h;
         for (int n = 0; n < many; n++) {
@@ -166,8 +232,9 @@ double meet_corners(int i, int j, double from, double until, double most, double
             else if (rolls && in_reach[n] == a.count + b.round) least = 0;
         }
         h = MIN(h + MAX(least / most, span / STRIDES), span);
-        double t = h < span ? from + h : until;
-        Shape a2 = shape_of(i, t), b2 = shape_of(j, t);
+        double t = h < span ? from + h : until, closes;
+        Shape a2, b2;
+        if (!both) a2 = shape_of(i, t), b2 = shape_of(j, t);
         for (int n = 0; n < many; n++) {
             int c = in_reach[n];
             Touch now = {.which = c};
@@ -175,18 +242,21 @@ double meet_corners(int i, int j, double from, double until, double most, double
             double before = gap[c];
             /* The surface may have been moved to the time of another root. */
             if (j < 0) b2.s = surface_at(-1 - j, t);
-            gap[c] = gap_at(&a2, &b2, near, &now);
-            if (before <= 0 && gap[c] < before && c - a.count == b.round
+            gap[c] = both ? candidate_gap(i, j, a.count, c, t, &closes) : gap_at(&a2, &b2, near, &now);
+            if (before <= 0 && gap[c] < before && b.round >= 0 && c - a.count == b.round
                 && closes_faster(i, j, &a2, &b2, t, TOUCHING * small, soft))
                 first = MIN(first, rolls_at(i, j, last, t, soft));
             if (!(before > 0 && gap[c] <= 0)) continue;
-            double then = root_of(i, j, &now, last, t, before, gap[c], most);
+            double then = both ? corner_root(i, j, c, last, t, before, gap[c], most)
+                               : root_of(i, j, &now, last, t, before, gap[c], most);
             if (then >= first) continue;
             Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
             if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
         }
         /* A tip that passes through a tip within a stride is inside nothing after it, but edges cross then. */
         if (!clear || first < INFINITY || most * (t - last) < near) continue;
+        a2 = shape_of(i, t);
+        b2 = shape_of(j, t);
         clear = are_apart(&a2, &b2, 0);
         if (clear) continue;
         double then = overlap_at(i, j, last, t);

@@ -152,7 +152,7 @@ static double away_from(const Outline *a, double x, double y) {
         const double *q = a->p[n], *next = a->p[n + 1 < a->count ? n + 1 : 0];
         double ex = next[0] - q[0], ey = next[1] - q[1], u = x - q[0], v = y - q[1];
         double s = MIN(MAX((u * ex + v * ey) / (ex * ex + ey * ey), 0), 1);
-        best = MIN(best, hypot(u - s * ex, v - s * ey));
+        best = MIN(best, length_of(u - s * ex, v - s * ey));
     }
     return best;
 }
@@ -163,7 +163,7 @@ static double gap_at(const Motion *a, const Motion *b, double share, double h, d
     Outline one, other;
     place_outline(a, share, h, &one);
     place_outline(b, share, h, &other);
-    double off = hypot(one.x - other.x, one.y - other.y) - a->body->reach - b->body->reach, gap;
+    double off = length_of(one.x - other.x, one.y - other.y) - a->body->reach - b->body->reach, gap;
     if (off > enough || !(one.count || other.count)) return off;
     if (one.count && other.count) {
         gap = gap_of_edges(&one, &other, enough);
@@ -258,14 +258,14 @@ static int prepare(double *begin, double *end) {
         L.paths[i].knot = L.offsets[i];
         for (int n = 0; n < body->corners; n++) {
             const double *q = L.outlines + 2 * (body->outline + n);
-            body->reach = MAX(body->reach, hypot(q[0], q[1]));
+            body->reach = MAX(body->reach, length_of(q[0], q[1]));
         }
         size += body->reach;
         if (last_of(i) < L.offsets[i]) continue;
         *begin = MIN(*begin, KNOT(L.offsets[i])[0]);
         *end = MAX(*end, KNOT(last_of(i))[0]);
         for (int k = L.offsets[i]; k < last_of(i); k++)
-            way += hypot(KNOT(k + 1)[1] - KNOT(k)[1], KNOT(k + 1)[2] - KNOT(k)[2]);
+            way += length_of(KNOT(k + 1)[1] - KNOT(k)[1], KNOT(k + 1)[2] - KNOT(k)[2]);
     }
     double knots = L.offsets[L.particle_count];
     return 1 + (int)MAX(0.5 * knots / L.particle_count, MIN(way / size, knots));

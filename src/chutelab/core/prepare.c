@@ -305,7 +305,7 @@ static int lay_out_work(void) {
     RESERVE(W.balance, crowd ? 10.0 * n : 0);
     RESERVE(W.solver_bodies, n + 1.0 + W.mover_count);
     RESERVE(W.edges, 3.0 * W.outline_count);
-    RESERVE(W.poses, W.outline_count ? 6.0 * n : 0);
+    RESERVE(W.poses, W.outline_count ? 3.0 * n : 0);
     RESERVE(W.light_bodies, n + 1.0 + W.mover_count);
     RESERVE(W.joint_rows, W.joint_row_count);
     RESERVE(W.joint_matrix, (double)W.joint_row_count * W.joint_row_count);

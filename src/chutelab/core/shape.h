@@ -16,6 +16,14 @@ typedef struct {
     int facing;             /* of two polygons: the edge that separates the other most, see `are_apart` */
 } Shape;
 
+/* The smaller and the larger of two numbers, without a branch. */
+static inline double smaller(double a, double b) {
+    return wasm_f64x2_extract_lane(wasm_f64x2_pmin(wasm_f64x2_splat(b), wasm_f64x2_splat(a)), 0);
+}
+static inline double larger(double a, double b) {
+    return wasm_f64x2_extract_lane(wasm_f64x2_pmax(wasm_f64x2_splat(b), wasm_f64x2_splat(a)), 0);
+}
+
 /* Unit vector out of an edge of a polygon, and the length of the edge. */
 static inline double out_of(const Shape *a, int edge, double *n) {
     n[0] = a->n[edge][0];
@@ -39,8 +47,16 @@ static inline int furthest(const Shape *a, const double *q, double *off) {
     return found;
 }
 
+/* The distance of a point from the edge that it is furthest outside of, m. */
+static inline double outside(const Shape *a, const double *q) {
+    double off = off_edge(a, 0, q);
+    for (int n = 1; n < a->count; n++) off = larger(off, off_edge(a, n, q));
+    return off;
+}
+
 /* shapes.c */
-const double *pose_of(int j, double turned, int later);
+const double *pose_of(int j);
+void turn_pose(int j, double by, double *pose);
 Shape shape_of(int j, double t);
 int are_apart(Shape *a, Shape *b, double by);
 void fill_in(const Shape *a, const Shape *b, Touch *t);

@@ -10,14 +10,45 @@
 #define DEEP 0.2
 /* The same for a place beyond an end. */
 #define ROUNDED 1e-6
+/* rad; up to this angle five terms give its sine, and what its cosine lacks of 1, to the last bit. */
+#define SMALL 0.1
+#define S3 (-1 / 6.0)
+#define S5 (1 / 120.0)
+#define S7 (-1 / 5040.0)
+#define S9 (1 / 362880.0)
+#define S11 (-1 / 39916800.0)
+#define C4 (-1 / 24.0)
+#define C6 (1 / 720.0)
+#define C8 (-1 / 40320.0)
+#define C10 (1 / 3628800.0)
 
-/* Cosine and sine of the angle of a particle, cached for two angles of each. */
-const double *pose_of(int j, double turned, int later) {
-    double *pose = W.poses + 6 * j + 3 * later;
+/* Cosine and sine of the angle of a particle. */
+const double *pose_of(int j) {
+    double *pose = W.poses + 3 * j, turned = W.disks[j].turned;
     if (pose[0] == turned && pose[1] != pose[2]) return pose + 1;
     pose[0] = turned;
     sin_cos(fabs(turned) < 1e6 ? turned : fmod(turned, 2 * PI), pose + 2, pose + 1);
     return pose + 1;
+}
+
+/* The same after it has rotated by a further angle. Of a small angle the series of sine and cosine end soon. */
+void turn_pose(int j, double by, double *pose) {
+    double x = by * by, c = x * (0.5 + x * (C4 + x * (C6 + x * (C8 + x * C10))));
+    double s = by * (1 + x * (S3 + x * (S5 + x * (S7 + x * (S9 + x * S11)))));
+    if (!(fabs(by) < SMALL)) {
+        double turned = W.disks[j].turned + by;
+        sin_cos(fabs(turned) < 1e6 ? turned : fmod(turned, 2 * PI), pose + 1, pose);
+        return;
+    }
+    const double *now = pose_of(j);
+    pose[0] = now[0] - (now[0] * c + now[1] * s);
+    pose[1] = now[1] - (now[1] * c - now[0] * s);
+}
+
+/* A vector turned by an angle, of which `along` has the cosine twice, and `across` the sine, first with the other sign. */
+static inline Two rotated(Two along, Two across, const double *v) {
+    Two from = two(v);
+    return plus(wasm_f64x2_mul(along, from), wasm_f64x2_mul(across, wasm_i64x2_shuffle(from, from, 1, 0)));
 }
 
 Shape shape_of(int j, double t) {
@@ -45,14 +76,17 @@ Shape shape_of(int j, double t) {
     out.y = d->y + (d->vy + 0.5 * W.gy * h) * h;
     out.count = d->corners;
     if (d->corners) {
-        const double *pose = pose_of(j, d->turned + d->spin * h, h != 0), *corner = W.outlines + 2 * d->outline;
-        const double *edge = out.edges = W.edges + 3 * d->outline;
-        double c = pose[0], s = pose[1];
+        const double *pose, *corner = W.outlines + 2 * d->outline, *edge = out.edges = W.edges + 3 * d->outline;
+        double later[2];
+        if (h == 0) pose = pose_of(j);
+        else {
+            turn_pose(j, d->spin * h, later);
+            pose = later;
+        }
+        Two along = wasm_f64x2_splat(pose[0]), across = wasm_f64x2_make(-pose[1], pose[1]), centre = two(&out.x);
         for (int n = 0; n < d->corners; n++, corner += 2, edge += 3) {
-            out.p[n][0] = out.x + c * corner[0] - s * corner[1];
-            out.p[n][1] = out.y + s * corner[0] + c * corner[1];
-            out.n[n][0] = c * edge[0] - s * edge[1];
-            out.n[n][1] = s * edge[0] + c * edge[1];
+            wasm_v128_store(out.p[n], plus(centre, rotated(along, across, corner)));
+            wasm_v128_store(out.n[n], rotated(along, across, edge));
         }
         return out;
     }
@@ -67,8 +101,16 @@ Shape shape_of(int j, double t) {
 /* Distance of a whole shape outside of an edge, m; negative if it is partly inside. */
 static double clear_of(const Shape *a, int edge, const Shape *b) {
     double least = INFINITY;
+    if (b->round < 0) {
+        Two from = two(a->p[edge]), out = two(a->n[edge]);
+        for (int n = 0; n < b->count; n++) {
+            Two off = wasm_f64x2_mul(minus(two(b->p[n]), from), out);
+            least = smaller(least, wasm_f64x2_extract_lane(off, 0) + wasm_f64x2_extract_lane(off, 1));
+        }
+        return least;
+    }
     for (int n = 0; n < b->count; n++)
-        least = MIN(least, off_edge(a, edge, b->p[n]) - (n == b->round ? b->radius : 0));
+        least = smaller(least, off_edge(a, edge, b->p[n]) - (n == b->round ? b->radius : 0));
     return least;
 }
 
@@ -106,16 +148,24 @@ static int edge_under(const Shape *a, const Shape *b, const double *q, double ne
 /* Whether two polygons are apart by more than `by` along an edge of the first one. If not, note the edge that separates
    them most. */
 static int are_apart_along(Shape *a, const Shape *b, double by) {
-    double best = -INFINITY;
-    for (int e = 0; e < a->count; e++) {
-        /* The particle as a whole is out by less than its centre is. */
-        if (!b->s && off_edge(a, e, &b->x) < best) continue;
+    double off[MOST_CORNERS], best;
+    int found = 0;
+    /* A particle as a whole is out by less than its centre is. The edge that its centre is furthest out of comes first. */
+    for (int e = 0; e < a->count && !b->s; e++) {
+        off[e] = off_edge(a, e, &b->x);
+        if (off[e] > off[found]) found = e;
+    }
+    best = clear_of(a, found, b);
+    if (best > by) return 1;
+    for (int e = 0, first = found; e < a->count; e++) {
+        if (e == first || (!b->s && off[e] < best)) continue;
         double clear = clear_of(a, e, b);
         if (clear > by) return 1;
-        if (clear <= best) continue;
+        if (clear < best || (clear == best && e > found)) continue;
         best = clear;
-        a->facing = e;
+        found = e;
     }
+    a->facing = found;
     return 0;
 }
 

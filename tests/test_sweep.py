@@ -195,8 +195,8 @@ def test_a_batch_is_judged_inside_its_rides_before_their_knots_are_dropped(sunk)
     core.run("follow_and_judge", 1, -2)
     pieces = core.array("barriers", dtype("Barrier"), 10, of="Laws")
     (spoon,) = (row for row in pieces[:5] if row["radius"] == 0.5)
-    spoon["begin"] += 0.3
-    spoon["extent"] -= 0.6
+    spoon["begin"] += 0.6
+    spoon["extent"] -= 1.2
     spoon["radius"] -= sunk
     exact.follow(core, recorder, None)
     # What stands out is run again with all its knots, and by the machine itself it keeps all laws.

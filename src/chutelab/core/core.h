@@ -422,6 +422,9 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
 void lie_down(int i);
 void was_moved(int i);
 
+/* jam.c */
+void jam(Contact *struck, double t);
+
 /* touching.c */
 double gap_later(const Contact *c, double h, double *bends);
 double time_unloaded(const double *load, const double *t);

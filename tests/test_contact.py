@@ -398,6 +398,30 @@ def test_a_hundred_disks_that_roll_take_longer_steps_than_fewer(count, r, run_, 
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_one_disk_among_thousands_does_not_end_the_step_of_all(seed):
+    """They land in a drum; steps are 0.7 to 0.5 of that whose hops are g h^2 / 8 = 1e-3 r high."""
+    r, end = 0.004, 0.2
+    drawn = {
+        "particle": {"radius": r, "mass": 0.0021, "spin": True},
+        "surface": [
+            {"name": "drum", "center": [0.0, 0.0], "radius": 0.31, "from_deg": -180.0,
+             "to_deg": 180.0, "speed": 0.5, "restitution": 0.5, "friction": 0.5},
+        ],
+        "stream": {"count": 2000, "fill": [[-0.21, -0.21], [0.21, 0.21]], "velocity": [0.0, 0.0],
+                   "interact": True, "restitution": 0.5, "friction": 0.3, "seed": seed},
+        "run": {"until": end},
+    }  # fmt: skip
+    machine = build(scene.from_dict(drawn))
+    recording, times = run(machine), np.arange(0.0, end, 5e-3)
+    h = sqrt(8e-3 * r / G)
+    assert end / (0.7 * h) < len(recording.totals) < end / (0.5 * h)
+    assert overlaps(recording, times).percentile_99 <= 0.005
+    assert inside_surfaces(recording, machine, times).worst <= 0.015
+    assert ledger(recording).relative_residual <= 1e-11
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("width", np.linspace(0.15, 0.3, 20).round(4))
 def test_boxes_are_asleep_within_four_seconds(width):
     """A row that is jammed between the walls rattles in its place: it keeps nothing awake."""

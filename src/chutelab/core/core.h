@@ -47,7 +47,7 @@ enum Phase { PART, STEP, WITHIN };
 /* ... from which on a disk that rattles between surfaces is jammed: it is solved together with all that it touches ... */
 #define JAM 40
 /* ... and from which on the step ends, so that the whole crowd round it is solved together; or, if that was less than
-   SHORTEST of a step ago, the jam. */
+   SHORTEST of a step ago, the jam. In a vast crowd jams come first, see `jams_pay`. */
 #define CROWDED 50
 #define SHORTEST 0.02
 /* ... and from which on more is left to the next step, without bound, as jams do not calm it. */
@@ -423,9 +423,11 @@ void lie_down(int i);
 void was_moved(int i);
 
 /* jam.c */
+int jams_pay(void);
 void jam(Contact *struck, double t);
 
 /* touching.c */
+double ask(Contact *c, double closed, double later, double least, double h);
 double gap_later(const Contact *c, double h, double *bends);
 double time_unloaded(const double *load, const double *t);
 int find_contacts(double h, int *woke);

@@ -519,11 +519,13 @@ static void strike(int i, int j, double t) {
     }
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
     int jammed = impacts >= (j >= 0 ? CROWDED : c.rest < 1 ? JAM : CROWDED);
+    int slow = c.rest < 1 && impacts >= FEW && -u[0] < SLOW * W.g * W.dt;
+    jammed |= slow && jams_pay();
     if (jammed && is_driven(i, -u[0], c.rest)) {
         a->impacts = STALL + 1;
         jammed = 0;
     }
-    if (jammed || (c.rest < 1 && impacts >= FEW && -u[0] < SLOW * W.g * W.dt)) back = 0;
+    if (jammed || slow) back = 0;
     const Surface *met = j < 0 ? surface_at(-1 - j, t) : 0;
     double drawn = pressed_by_joints(&c), press = met ? press_on(a, met, c.nx, c.ny) + drawn : 0, later = 0;
     if (!met && drawn > 0 && back <= drawn * W.step) back = 0;

@@ -500,6 +500,7 @@ typedef struct {
     int hinges;          /* number of hinges */
     int swings_too;      /* some contacts that are solved act on hinges */
     int stamp, shocks, jams; /* numbers of the latest query, shock and jam, for marks */
+    int step_jams;       /* number of jams in this step */
     double t, now, step, step_end, cell;
     double looked;       /* s; time for which it is set which surfaces exist */
     double chosen;       /* [in] s; the usual step if `dt` is not the scene's: longer ones stay further below what hops allow */

@@ -538,7 +538,7 @@ static int begin_step(void) {
     if (W.interact) judge_overlaps();
     if (W.pushes) kick_disks(h);
     if (W.hinges) begin_hinges(W.t, h);
-    W.swings_too = 0;
+    W.swings_too = W.step_jams = 0;
     W.unsolved = 0;
     if (W.contact_count) solve_contacts(0);
     if (W.joint_count) {
@@ -640,7 +640,7 @@ static int go_through(void) {
             return STALLED;
         }
         if (j != ALARM) {
-            if (W.interact && d->impacts > CROWDED && t > W.t + SHORTEST * W.step) {
+            if (W.interact && d->impacts > CROWDED && !jams_pay() && t > W.t + SHORTEST * W.step) {
                 W.step_end = t;
                 continue;
             }

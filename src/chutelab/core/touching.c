@@ -87,6 +87,25 @@ static double closes(const Contact *c, double aim, double h) {
     return need;
 }
 
+/* Ask of a contact that its gap is `closed` after the time h, or that a part of a deep overlap is removed by then;
+   without impulses its gap would be `later`. Return the gap that it asks for. */
+double ask(Contact *c, double closed, double later, double least, double h) {
+    double aim = closed;
+    if (c->gap < -SLOP * least) {
+        /* A shorter step removes less, at the same speed; else it would give more energy. */
+        double share = MIN(h / W.usual, 1), beyond = c->gap + SLOP * least;
+        double part = MAX(MAX(PART, -c->gap / (DEEP * least)), -W.soft * W.step / beyond);
+        aim = -SLOP * least + (1 - share * MIN(part, 1)) * beyond;
+        if (W.interact) {
+            c->most = (c->gap + share * MOST_PARTED * least - later) / h;
+            c->gives = GIVES;
+        }
+    }
+    c->need = (aim - later) / h;
+    c->parts = (aim - closed) / h;
+    return aim;
+}
+
 /* Add a contact if the two touch and approach slowly, up to `bound`. With corners it is that at `place`, or continues the
    contact `still`, whose gap has changed by `change` since it was looked up. `least` is the smaller radius. Return 0 if
    there is no room. */
@@ -126,20 +145,7 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     if (last && last->halved) parts = MAX(parts, LEFT_BY_TURNS * W.pace);
     if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > parts)) return 1;
     /* Cohesion keeps a gap from opening; it never closes one. */
-    double aim = cohesion > 0 ? MIN(MAX(later, 0), c->gap) : 0, closed;
-    closed = aim = MIN(c->gap, aim);
-    if (c->gap < -SLOP * least) {
-        /* A shorter step removes less, at the same speed; else it would give more energy. */
-        double share = MIN(h / W.usual, 1), beyond = c->gap + SLOP * least;
-        double part = MAX(MAX(PART, -c->gap / (DEEP * least)), -W.soft * W.step / beyond);
-        aim = -SLOP * least + (1 - share * MIN(part, 1)) * beyond;
-        if (W.interact) {
-            c->most = (c->gap + share * MOST_PARTED * least - later) / h;
-            c->gives = GIVES;
-        }
-    }
-    c->need = (aim - later) / h;
-    c->parts = (aim - closed) / h;
+    double closed = MIN(c->gap, cohesion > 0 ? MAX(later, 0) : 0), aim = ask(c, closed, later, least, h);
     c->drift = 0.5 * h * c->pull;
     if (cornered && W.g == 0) {
         /* Without weight no hop is larger than the fall before it: nothing would supply the energy. */

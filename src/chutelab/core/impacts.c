@@ -12,9 +12,10 @@
 #define LATE 5e-3
 #define MORE 1e-3
 #define LATE_CORNERS 2e-3
-/* An impact of two particles in a pile has no restitution up to W.soft, and along gravity up to so many times that speed.
-   With less, piles of smooth elastic disks never come to rest: each fall makes an overlap, and its removal lifts what
-   falls next. */
+/* An impact of two particles in a pile has no restitution up to W.soft. If the pair has a restitution of ELASTIC or more, it
+   has none up to so many times that speed along gravity: else piles of smooth disks never come to rest, as each fall makes
+   an overlap, and its removal lifts what falls next. */
+#define ELASTIC 0.9
 #define LULLED 4.0
 
 /* ------------------------------------------------------------------ the next event of each disk */
@@ -485,6 +486,7 @@ int is_alone(const Contact *c, const double *before) {
 
 /* Approach below which an impact of two particles in a pile has no restitution, m/s. */
 static double lulled(const Contact *c) {
+    if (c->rest < ELASTIC) return W.soft;
     return W.soft + 2 * (LULLED - 1) * W.step * fabs(W.gx * c->nx + W.gy * c->ny);
 }
 

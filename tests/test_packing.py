@@ -1,7 +1,9 @@
 """Files of large crowds: tracks within a share of the radius, sums and ends to the last bit."""
 
+import hashlib
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -160,6 +162,20 @@ def test_a_small_crowd_and_what_is_too_far_away_keep_all_bits(tmp_path):
         with pytest.raises(ValueError, match=r"^tolerance = .*: from 0 to 0\.01 radii$"):
             storage.save(record, tmp_path / "none.npz", tolerance=tolerance)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["far.npz", "few.npz"]
+
+
+def test_a_packed_file_of_an_earlier_version_is_read_as_it_was():
+    """Four disks fall into a bin, and push each other several times at an instant (format 2)."""
+    record = storage.load(Path(__file__).parent / "earlier.npz")
+    told = hashlib.sha256(record.knots.tobytes()).hexdigest()
+    assert told == "41ddb5bc563f57dc8206789f29cab252c6b34f814f84fad65089820c33474b5f"
+    events, (mass,) = record.events, set(record.mass.tolist())
+    assert events["normal_impulse"].sum() == pytest.approx(0.09655873089753793, rel=1e-14)
+    assert events["omega_after"].sum() == pytest.approx(-117.2991350064202, rel=1e-14)
+    push = mass * (events["velocity_after"] - events["velocity_before"])
+    size = np.hypot(events["normal_impulse"], events["tangential_impulse"])
+    assert np.abs(np.hypot(*push.T) - size).max() <= 2e-6 * mass * 0.01 / record.machine.dt
+    assert Recording.of(record).laws == ()
 
 
 def test_a_packed_file_that_is_damaged_or_made_to_fill_the_memory_is_refused(tmp_path):

@@ -192,7 +192,7 @@ def refused(path):
 
 def test_another_version_is_refused(tmp_path):
     path = run().save(tmp_path / "old.npz")
-    for version in (0, 3, "1", None):
+    for version in (0, 4, "1", None):
         altered(path, lambda about, version=version: {**about, "format": version})
         assert "another version" in refused(path)
 

@@ -10,7 +10,8 @@ of velocity times dt, with an error of at most 0.5 ε r. After an interval much 
 these units are finer, or the velocity *between* two knots would be far off. So a track is off by
 less than ε r at any time. Entries of the ledger have units with which the error of all particles
 together is less than ε of the energy turned over. The states of events are predicted from the
-tracks, and the impulses from these states.
+tracks, or from the event before if a particle has several at an instant, and the impulses from
+these states.
 
 Times, the ends of tracks, and all sums such as the ledger's are kept to the last bit.
 """
@@ -19,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from math import prod, sqrt
 from typing import Any
 
@@ -65,12 +67,11 @@ STATE: tuple[tuple[str, Any], ...] = (
 )  # fmt: skip
 """The other fields of an event except the time, with the component of each."""
 
-ROWS = (0, 0, 1, 1, 2, 1, 1, 2, 4, 4)
-"""Index of the unit of each."""
+SPLIT = (5, 8)
+"""Rows of these at which a new array of whole numbers begins."""
 
-Give = Callable[[slice, Floats], Floats]
-"""Function of some rows of `STATE` and their predictions, (c, E), that returns the actual
-values."""
+ROWS = (0, 0, 1, 1, 2, 1, 1, 2, 4, 4)
+"""Index of the unit of each row."""
 
 
 def rounded(values: Floats) -> Ints:
@@ -96,46 +97,93 @@ def unfold(told: NDArray[np.uint8]) -> Ints:
     return np.cumsum((bits >> 1 & np.iinfo(np.int64).max) ^ -(bits & 1), axis=-1)
 
 
+class Orders:
+    """The order in which sizes of numbers are written: that of the rows before.
+
+    Rows of one length belong to the same knots, or events. If a number is small, so are others of
+    its knot. Sorted by the largest size so far, and then by that of the last row, sizes compress
+    better.
+    """
+
+    def __init__(self) -> None:
+        self.keys: dict[int, NDArray[np.uint16]] = {}
+
+    def of(self, count: int) -> Ints:
+        """Return the order of the next row of so many numbers."""
+        key = self.keys.setdefault(count, np.zeros(count, dtype=np.uint16))
+        return np.argsort(key, kind="stable")
+
+    def add(self, sizes: NDArray[np.uint8]) -> None:
+        """Take the sizes of that row into account."""
+        most = np.maximum(self.keys[len(sizes)] >> 8, sizes)
+        self.keys[len(sizes)] = (most << 8) + sizes
+
+
+def planes(sizes: NDArray[np.uint8]) -> tuple[Ints, Ints]:
+    """Return indices of numbers, most digits first, and how many have over 0, 1, ... digits."""
+    many = np.bincount(sizes, minlength=1)[:0:-1].cumsum()[::-1]
+    return np.argsort(~sizes, kind="stable"), many
+
+
 def write(arrays: Iterable[Ints]) -> dict[str, NDArray[np.uint8]]:
     """Return whole numbers as their numbers of binary digits, and all digits but the first."""
-    sizes, bits = [], []
-    for numbers in map(np.ravel, arrays):
-        size = np.abs(numbers)
-        digits = np.frexp(size.astype(np.float64))[1].astype(np.uint8)
-        sizes.append(digits)
-        bits.append(np.packbits(numbers[digits > 0] < 0))
-        for n in range(1, int(digits.max(initial=0))):
-            size, digits = size[digits > n], digits[digits > n]
-            bits.append(np.packbits(size >> (n - 1) & 1))
+    sizes, bits, orders = [], [np.zeros(0, dtype=np.uint8)], Orders()
+    for numbers in arrays:
+        digits = np.frexp(np.abs(numbers).astype(np.float64))[1].astype(np.uint8)
+        for row in np.atleast_2d(digits):
+            sizes.append(row[orders.of(len(row))])
+            orders.add(row)
+        order, many = planes(digits.ravel())
+        told = numbers.ravel()[order]
+        size = np.abs(told)
+        for n, count in enumerate(many.tolist()):
+            bits.append(np.packbits(size[:count] >> (n - 1) & 1 if n else told[:count] < 0))
     return {"sizes": np.concatenate(sizes), "bits": np.concatenate(bits)}
 
 
 class Reader:
-    """Returns the numbers given to `write`, in the same order."""
+    """Returns the numbers given to `write`, in the same order.
 
-    def __init__(self, sizes: NDArray[np.uint8], bits: NDArray[np.uint8]) -> None:
+    In files of an `earlier` version neither sizes nor digits are sorted.
+    """
+
+    def __init__(
+        self, sizes: NDArray[np.uint8], bits: NDArray[np.uint8], *, earlier: bool = False
+    ) -> None:
         self.sizes, self.bits = sizes, bits
+        self.orders = None if earlier else Orders()
 
-    def digits(self, count: int) -> Ints:
-        """Return the next binary digit of so many numbers."""
-        many = (count + 7) // 8
+    def digits(self, at: Ints) -> Ints:
+        """Return the next binary digit of the numbers with these indices."""
+        many = (len(at) + 7) // 8
         bits, self.bits = self.bits[:many], self.bits[many:]
-        return np.unpackbits(bits)[:count].astype(np.int64)
+        told = np.unpackbits(bits)[: len(at)].astype(np.int64)
+        if not self.orders and len(at):
+            there = np.zeros(at.max() + 1, dtype=bool)
+            there[at] = True
+            told = told[np.cumsum(there)[at] - 1]
+        return told
 
     def read(self, *shape: int) -> Ints:
         """Return the next numbers."""
         sizes, self.sizes = np.split(self.sizes, [prod(shape)])
         if len(sizes) < prod(shape):
             raise ValueError("too few numbers")
-        at = some = np.flatnonzero(sizes)
-        numbers = np.zeros(shape, dtype=np.int64)
-        signs, found = 1 - 2 * self.digits(len(some)), numbers.ravel()
-        found[some] = 1 << (sizes[some].astype(np.int64) - 1)
-        for n in range(1, int(sizes.max(initial=0))):
-            at = at[sizes[at] > n]
-            found[at] |= self.digits(len(at)) << (n - 1)
-        found[some] *= signs
-        return numbers
+        if self.orders:
+            sizes = sizes.copy()
+            for row in sizes.reshape(-1, shape[-1]):
+                row[self.orders.of(len(row))] = row.copy()
+                self.orders.add(row)
+        order, many = planes(sizes)
+        numbers = np.zeros(len(sizes), dtype=np.int64)
+        if len(many):
+            some = order[: many[0]]
+            signs = 1 - 2 * self.digits(some)
+            found = 1 << (sizes[some].astype(np.int64) - 1)
+            for n, count in enumerate(many[1:].tolist()):
+                found[:count] |= self.digits(some[:count]) << n
+            numbers[some] = signs * found
+        return numbers.reshape(shape)
 
 
 class Intervals:
@@ -242,7 +290,8 @@ class Tracks:
     """The content of `COLUMNS` except the states of events.
 
     `still` (E,) marks events that change nothing; `keys` (K,) of knots and `when` (E,) of events
-    are in the order of particles and times.
+    are in the order of particles and times. `first` (E,) is the first event of the particle at
+    that instant, of those in a row; in files of an `earlier` version the event itself.
     """
 
     knots: NDArray[Any]
@@ -251,11 +300,17 @@ class Tracks:
     still: Bools
     keys: Ints
     when: Ints
+    first: Ints
     steps: Floats
 
     @classmethod
     def of(
-        cls, packed: dict[str, NDArray[Any]], offsets: Ints, read: Callable[..., Ints]
+        cls,
+        packed: dict[str, NDArray[Any]],
+        offsets: Ints,
+        read: Callable[..., Ints],
+        *,
+        earlier: bool = False,
     ) -> Tracks:
         """Return the content; `ValueError` or `IndexError` if the columns do not fit together.
 
@@ -286,12 +341,17 @@ class Tracks:
         knots[[intervals.first, intervals.last]] = ends
         owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
         keys, when = at + len(times) * owner, when + len(times) * whole[0]
-        return cls(knots, angle, events, still > 0, keys, when, units[ROWS, None])
+        first = np.arange(len(when))
+        if not earlier:
+            first[1:][np.diff(when) == 0] = 0
+            first = np.maximum.accumulate(first)
+        return cls(knots, angle, events, still > 0, keys, when, first, units[ROWS, None])
 
-    def states(self, particle: Particle, give: Give) -> Floats:
-        """Return all rows of `STATE`, predicted from the tracks and from earlier rows.
+    @cached_property
+    def foretold(self) -> tuple[Floats, Bools]:
+        """The first eight rows of `STATE` from the tracks, and where the last three are used.
 
-        `particle` has radii, masses and inertias.
+        These are states after an event; they are used where a track has them as a knot.
         """
         knots, events = self.knots, self.events
         begin, end = (np.searchsorted(self.keys, self.when, side) for side in ("left", "right"))
@@ -303,16 +363,43 @@ class Tracks:
         share = np.divide(events["t"] - t, h, out=np.ones(len(t)), where=h > 0.0).clip(0.0, 1.0)
         before = np.stack([*a["position"].T, *a["velocity"].T, a["omega"]])
         before[:4] = np.where(there, before[:4], np.hstack(hermite(knots, left, share)).T)
-        before = give(np.s_[:5], before)
-        changes, same = ~self.still, before[2:]
-        after = np.where(there, np.stack([*b["velocity"].T, b["omega"]]), same)
-        after = np.where(changes, give(np.s_[5:8], np.where(changes, after, same)), same)
+        last = np.append(np.diff(self.first), 1) > 0
+        after = np.stack([*b["velocity"].T, b["omega"]])
+        return np.concatenate([before, after]), there & ~self.still & last
+
+    def states(self, told: Ints, particle: Particle) -> Floats:
+        """Return all rows of `STATE` from stored numbers.
+
+        Numbers of the `first` event of a particle at an instant are added to what its track tells,
+        those of the others to the state before. `particle` has radii, masses and inertias.
+        """
+        foretold, known = self.foretold
+        both = told[2:5] + told[5:8]
+        passed = np.cumsum(both, axis=1) - both
+        before = told[2:5] + passed - passed[:, self.first]
+        state = foretold + self.steps[:8] * told[:8]
+        state[2:5] = foretold[2:5] + self.steps[2:5] * before
+        follows = foretold[2:5] + self.steps[2:5] * (before + told[5:8])
+        state[5:8] = np.where(known, state[5:8], follows)
         # An impulse is the change of momentum; its tangential part changes the spin.
-        body = particle.of(events["particle"])
-        along = body.inertia / body.radius * (after[2] - before[4])
-        square = body.mass**2 * ((after[:2] - before[2:4]) ** 2).sum(axis=0) - along**2
-        impulse = give(np.s_[8:], np.stack([np.sqrt(np.maximum(square, 0.0)), along]))
-        return np.concatenate([before, after, impulse])
+        change = state[5:8] - state[2:5]
+        body = particle.of(self.events["particle"])
+        along = body.inertia / body.radius * change[2]
+        square = body.mass**2 * (change[:2] ** 2).sum(axis=0) - along**2
+        impulse = np.stack([np.sqrt(np.maximum(square, 0.0)), along])
+        return np.concatenate([state, impulse + self.steps[8:] * told[8:]])
+
+    def tell_states(self, exact: Floats, particle: Particle) -> Ints:
+        """Return the numbers that `states` decodes."""
+        foretold, known = self.foretold
+        told = np.zeros(exact.shape, dtype=np.int64)
+        told[:8] = rounded((exact[:8] - foretold) / self.steps[:8])
+        follows = rounded((exact[5:8] - foretold[2:5]) / self.steps[2:5])
+        told[5:8] = np.where(known, told[5:8], follows - told[2:5])
+        later = np.flatnonzero(self.first < np.arange(len(known)))
+        told[2:5, later] -= follows[:, later - 1]
+        told[8:] = rounded((exact - self.states(told, particle))[8:] / self.steps[8:])
+        return told
 
 
 def units_of(record: Record, tolerance: float) -> Floats:
@@ -363,25 +450,22 @@ def pack(record: Record, tolerance: float) -> dict[str, NDArray[Any]]:
     }
     later = iter(told)
     tracks = Tracks.of(packed, record.offsets, lambda *_shape: next(later))
-
-    def give(rows: slice, foretold: Floats) -> Floats:
-        told.append(rounded((exact[rows] - foretold) / tracks.steps[rows]))
-        return np.asarray(foretold + tracks.steps[rows] * told[-1])
-
-    tracks.states(record.particle, give)
+    told += np.split(tracks.tell_states(exact, record.particle), SPLIT)
     return packed | write(told)
 
 
-def unpack(packed: dict[str, NDArray[Any]], offsets: Ints, particle: Particle) -> dict[str, Any]:
-    """Return the knots, angles and events given to `pack`, within its tolerance, and the `unit`."""
-    reader = Reader(packed["sizes"], packed["bits"])
-    tracks = Tracks.of(packed, offsets, reader.read)
+def unpack(
+    packed: dict[str, NDArray[Any]], offsets: Ints, particle: Particle, *, earlier: bool = False
+) -> dict[str, Any]:
+    """Return the knots, angles and events given to `pack`, within its tolerance, and the `unit`.
 
-    def give(rows: slice, foretold: Floats) -> Floats:
-        told = reader.read(*foretold.shape)
-        return np.asarray(foretold + tracks.steps[rows] * told)
-
-    for (name, part), values in zip(STATE, tracks.states(particle, give), strict=True):
+    `earlier` is whether an earlier version packed them.
+    """
+    reader = Reader(packed["sizes"], packed["bits"], earlier=earlier)
+    tracks = Tracks.of(packed, offsets, reader.read, earlier=earlier)
+    many = len(tracks.events)
+    told = np.concatenate([reader.read(rows, many) for rows in np.diff([0, *SPLIT, len(STATE)])])
+    for (name, part), values in zip(STATE, tracks.states(told, particle), strict=True):
         tracks.events[name][part] = values
     if len(reader.sizes) or len(reader.bits):
         raise ValueError("too many numbers")

@@ -44,8 +44,8 @@ from chutelab.util.files import csv_lines, whole, write_lines
 from chutelab.util.tables import frame as data_frame
 from chutelab.util.tables import plain
 
-FORMAT, PACKED = 1, 2
-"""Versions of the file, the second for large crowds; other versions are refused."""
+FORMAT, EARLIER, PACKED = 1, 2, 3
+"""Versions of the file, the last for large crowds, as was the second; others are refused."""
 
 TOLERANCE = 1e-6
 """Largest error of tracks of a large crowd in a file, as a share of the radius."""
@@ -193,7 +193,7 @@ def load(path: str | Path) -> Record:
             raise OSError(ESPIPE, "it is no regular file")  # noqa: TRY301
         with zipfile.ZipFile(path) as archive:
             about = json.loads(str(_array(archive, "about")))
-            if about.get("format") in (FORMAT, PACKED):
+            if about.get("format") in (FORMAT, EARLIER, PACKED):
                 return _recording(about, archive)
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file") from None
@@ -273,7 +273,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     scene = from_dict(json.loads(about["scene"]), about["title"])
     # Any number of particles that were never released compresses to almost nothing.
     room = 8 * (scene.count + 1)
-    machine, is_packed = build(scene), about["format"] == PACKED
+    machine, is_packed = build(scene), about["format"] != FORMAT
     arrays: dict[str, Any] = {
         name: _array(archive, name, room)
         for name in ARRAYS
@@ -286,7 +286,9 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         packed = {name: _array(archive, name, room) for name in packing.COLUMNS}
         if not _fits(path, packed):
             raise _UnfitError("tracks or events would be too large for the file")
-        arrays |= packing.unpack(packed, arrays["offsets"], machine.particle)
+        arrays |= packing.unpack(
+            packed, arrays["offsets"], machine.particle, earlier=about["format"] == EARLIER
+        )
     about.pop("seconds", None)  # earlier files have the time that the run took
     about.setdefault("gained", 0.0)  # ... and not this
     told = {name: about[name] for name in ("engine", "steps", "contacts", "gained")}

@@ -191,8 +191,7 @@ class Module:
     def array(self, name: str, kind: np.dtype[Any], count: int, of: str = "World") -> NDArray[Any]:
         """Return a view of the array that a field points to, valid until `work` or `run`."""
         begin: int = getattr(self.structs[of], name)
-        rows: NDArray[Any] = self._bytes[begin : begin + kind.itemsize * count].view(kind)
-        return rows
+        return np.frombuffer(self._bytes, kind, count, begin)
 
     def take_events(self, of: str = "World") -> NDArray[Any]:
         """Return all events as the bytes of rows of `results.EVENT`, and make room for others.
@@ -208,7 +207,8 @@ class Module:
     def fill(self, of: str, **arrays: NDArray[Any]) -> None:
         """Copy arrays, flat and contiguous, to where the fields of a struct point."""
         for name, array in arrays.items():
-            self.array(name, np.dtype(np.uint8), array.nbytes, of)[:] = array.view(np.uint8)
+            begin: int = getattr(self.structs[of], name)
+            self._bytes[begin : begin + array.nbytes] = array.view(np.uint8)
 
     def begin_with(self, numbers: NDArray[Any]) -> bool:
         """Copy numbers to the place of the first array; return whether there is room for them."""

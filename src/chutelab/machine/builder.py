@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import chain
 from math import ceil, inf, nan, prod
 from typing import Any
@@ -169,8 +170,19 @@ def told(scene: Scene) -> Told:
         sizes = {
             "members": 1, "width": len(line), "term_width": len(terms), "owners": len(names),
         }  # fmt: skip
-        found = scene._told = sizes | counts(scene), np.array([*line, *terms], dtype=REAL)
+        numbers = np.array([*line, *terms], dtype=REAL)
+        numbers.flags.writeable = False
+        found = scene._told = sizes | counts(scene), numbers
     return found
+
+
+def _terms(scene: Scene) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return what is `told` as rows of the core's `BodyKeys`, (K,), and `Pair`, (K, K + S)."""
+    sizes, numbers = told(scene)
+    body, pair = dtype("BodyKeys"), dtype("Pair")
+    own = numbers[sizes["width"] :].view(np.uint8)[dtype("RunKeys").itemsize :]
+    split = sizes["particles"] * body.itemsize
+    return own[:split].view(body), own[split:].view(pair).reshape(sizes["particles"], -1)
 
 
 def hand_over(module: Module, scene: Scene) -> None:
@@ -221,8 +233,10 @@ def lay(
         rows = module.array(name, dtype(kind), every * prod(count), of="Plan")
         return rows.copy().reshape((*shape, *count))
 
-    rows = module.array("movers", dtype("Mover"), len(scene.movers), of="Plan")
-    movers = tuple(map(Mover.of, rows))
+    movers = tuple[Mover, ...]()
+    if scene.movers:
+        rows = module.array("movers", dtype("Mover"), len(scene.movers), of="Plan")
+        movers = tuple(map(Mover.of, rows))
     parts = {
         f"{kind.lower()}s": found(f"{kind.lower()}s", kind, getattr(plan, f"{kind.lower()}_count"))
         for kind in KINDS
@@ -250,17 +264,30 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         surface.
     """
     family = scenes if isinstance(scenes, Family) else None
-    scene, value = scenes.scene, scenes.value
-    names, meeting = scene.surfaces, scene.meetings(value)
-    kinds = len(scene.particles) if family is None else 1
-    met = [[meeting(kind, name) for kind in range(kinds)] for name in names]
-    # Adhesion is friction without a bound.
-    met = [[(e, inf if isinstance(mu, str) else mu) for e, mu in pairs] for pairs in met]
-    grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
+    scene, value, names = scenes.scene, scenes.value, scenes.scene.surfaces
+    met: Met
+    if family is None:
+        weights, pairs = _terms(scene)
+        masses, inertias = weights["mass"].tolist(), weights["inertia"].tolist()
+        kinds = len(weights)
+        met = [[pair[:2] for pair in each] for each in zip(*pairs[:, kinds:].tolist(), strict=True)]
+        two = pairs[:, :kinds]
+        rolling, falls = weights["rolling"].copy(), two["falls"].diagonal().copy()
+    else:
+        meeting, kinds, (masses, inertias) = scene.meetings(value), 1, bodies(family)
+        met = [[meeting(0, name)] for name in names]
+        # Adhesion is friction without a bound.
+        met = [[(e, inf if isinstance(mu, str) else mu)] for [(e, mu)] in met]
+        grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
+        # Particles of a family never meet each other.
+        pairs = two = np.zeros((1, 1), dtype("Pair"))
+        rolling = np.array([value(kind, "rolling_friction") for kind in scene.particles])
+        speeds = [value(kind, "restitution_speed") for kind in scene.particles]
+        falls = 1.0 / np.array([inf if one is None else one for one in speeds])
     module = borrow()
     try:
         if family is None:
-            rows, nominal, movers = lay(module, scenes, grip)
+            rows, nominal, movers = lay(module, scenes, inf)
         else:
             firsts = np.ravel(grip)[:: family.each] if np.ndim(grip) else grip
             rows, nominal, movers = lay(module, family.firsts, firsts)
@@ -271,13 +298,12 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     finally:
         give_back(module)
     parts: dict[str, Any] = {
-        name: _pieces(kind, rows[name], met, kinds)
+        name: _pieces(kind, rows[name], met, kinds) if rows[name].size else _no_pieces(kind, kinds)
         for name, kind in zip(rows, KINDS.values(), strict=True)
     }
-    belt, particles = scene.incoming, scene.particles
+    belt = scene.incoming
     until: Any = value(scene.run, "until")
-    worded = isinstance(until, str)
-    particle = _particle(scenes, releases.kind, radius)
+    particle = _particle(scenes, masses, inertias, releases.kind, radius)
     latest: Any = releases.t.max().item()
     if family is not None:
         latest = releases.t.reshape(-1, family.each).max(axis=1).repeat(family.each)
@@ -293,13 +319,6 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
             surface=0,
             incline=value(belt, "incline_deg") * RADIANS,
         )
-    # Particles of a family never meet each other.
-    pairs = np.zeros((1, 1, 2))
-    every = range(len(particles))
-    if family is None:
-        pairs = np.array([[meeting(a, b) for b in every] for a in every])
-        through = [[scene.passes(a, b) for b in every] for a in every]
-        pairs[..., 0] = np.where(through, PASSES, pairs[..., 0])
     joints = []
     for table, one in scene.joints if family is None else ():
         own = {key: getattr(one, key) for key in LACKS[1:] if hasattr(one, key)}
@@ -314,35 +333,23 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     triggers = tuple(
         Trigger(names.index(name), doing, names.index(by)) for name, doing, by in scene.triggers
     )
-    speeds = [value(kind, "restitution_speed") for kind in particles]
     machine = Machine(
-        scenes=scenes,
-        surfaces=names,
+        **_keys(scenes),
         gravity=value(scene, "gravity"),
-        air=value(scene, "air_density"),
         particle=particle,
         **parts,
         pulley=pulley,
         releases=releases,
-        landing=names.index("outgoing") if "outgoing" in names else -1,
-        until=until if worded else "time",
-        end_time=bound if worded else np.minimum(bound, until),
-        dt=_longest_step(scene, value(scene, "gravity"), value(scene.run, "dt")),
-        align=scene.run.align and not scene.air_density,
-        interact=scene.crowded,
-        pair_restitution=pairs[..., 0],
-        pair_friction=pairs[..., 1],
-        rolling=np.array([value(kind, "rolling_friction") for kind in particles]),
-        falls=1.0 / np.array([inf if one is None else one for one in speeds]),
-        cohesion=np.array(
-            [[scene.cohesion(a, b) for b in (*every, *names)] for a in every], dtype=float
-        ),
-        outlines=_outlines(scene),
+        end_time=bound if isinstance(until, str) else np.minimum(bound, until),
+        pair_restitution=two["restitution"].copy(),
+        pair_friction=two["friction"].copy(),
+        rolling=rolling,
+        falls=falls,
+        cohesion=pairs["cohesion"].copy(),
         joints=tuple(joints),
         movers=movers,
         triggers=triggers,
         streams=tuple(str(stream.name) for stream in scene.streams),
-        engine=scene.run.engine,
         plate_warnings=warnings,
     )
     return machine.when(np.full(len(triggers), inf)) if triggers else machine
@@ -357,43 +364,37 @@ def chooses(scene: Scene) -> bool:
     return scene.crowded and scene.count >= MANY and not given
 
 
-def _longest_step(scene: Scene, gravity: Any, dt: Any) -> Any:
-    """Return the longest step of the contact engine, s."""
-    return MOST_STEP / pace_of(gravity) if chooses(scene) else dt
-
-
 def ahead(scene: Scene) -> Machine:
     """Return the machine of a scene; it is built when more than its keys is needed."""
     if (known := scene._ahead) is None:
         if scene.hinges or scene.triggers:
             # Hinges can be checked only after they are weighed.
             return build(scene)
-        known = scene._ahead = _keys(scene)
+        without = {name: () for name in ("joints", "movers") if not getattr(scene, name)}
+        known = scene._ahead = {
+            "build": build, "count": scene.count, "triggers": (), **_keys(scene), **without
+        }  # fmt: skip
     machine = object.__new__(Machine)
     vars(machine).update(known)
     return machine
 
 
-def _keys(scene: Scene) -> dict[str, Any]:
-    """Return the parts of a machine that follow from keys alone, without joints and movers."""
-    until, names = scene.run.until, scene.surfaces
-    return dict(
-        build=build,
-        scenes=scene,
-        surfaces=names,
-        landing=names.index("outgoing") if "outgoing" in names else -1,
-        until=until if isinstance(until, str) else "time",
-        dt=_longest_step(scene, scene.gravity, scene.run.dt),
-        air=scene.air_density,
-        align=scene.run.align and not scene.air_density,
-        interact=scene.crowded,
-        engine=scene.run.engine,
-        count=scene.count,
-        outlines=_outlines(scene),
-        **({} if scene.joints else {"joints": ()}),
-        **({} if scene.movers else {"movers": ()}),
-        triggers=(),
-    )
+def _keys(scenes: Scene | Family) -> dict[str, Any]:
+    """Return the parts of a machine that follow from keys alone."""
+    scene, value, names = scenes.scene, scenes.value, scenes.scene.surfaces
+    until, gravity = value(scene.run, "until"), value(scene, "gravity")
+    return {
+        "scenes": scenes,
+        "surfaces": names,
+        "landing": names.index("outgoing") if "outgoing" in names else -1,
+        "until": until if isinstance(until, str) else "time",
+        "dt": MOST_STEP / pace_of(gravity) if chooses(scene) else value(scene.run, "dt"),
+        "air": value(scene, "air_density"),
+        "align": scene.run.align and not scene.air_density,
+        "interact": scene.crowded,
+        "engine": scene.run.engine,
+        "outlines": _outlines(scene),
+    }
 
 
 def _outlines(scene: Scene) -> tuple[Floats | None, ...]:
@@ -407,10 +408,8 @@ Met = Sequence[Sequence[tuple[Any, Any]]]
 def _pieces(kind: type[Pieces], rows: NDArray[Any], met: Met, kinds: int) -> Pieces:
     """Return one kind of pieces from their rows, (S,) or in a family (N, S)."""
     shape = rows.shape[:-1]
-    if not rows.size:
-        rows = rows.reshape(-1)  # without pieces there is nothing per scene
-    known = [name for name in kind.__dataclass_fields__ if name in (rows.dtype.names or ())]
-    own = {name: rows[name] for name in known}
+    given = rows.dtype.names or ()
+    own = {name: rows[name] for name in kind.__dataclass_fields__ if name in given}
     if rows.ndim > 1:
         # Pieces of all members lie side by side and belong to the same surfaces.
         own = {
@@ -427,6 +426,12 @@ def _pieces(kind: type[Pieces], rows: NDArray[Any], met: Met, kinds: int) -> Pie
     return kind(**own | {"surface": surface}, restitution=restitution.T, friction=friction.T)
 
 
+@cache
+def _no_pieces(kind: type[Pieces], kinds: int) -> Pieces:
+    """Return no pieces of a kind; there is nothing per scene then."""
+    return _pieces(kind, np.empty(0, dtype(kind.__name__.removesuffix("s"))), (), kinds)
+
+
 def bodies(scenes: Scene | Family) -> tuple[list[Any], list[Any]]:
     """Return mass (kg) and moment of inertia (kg m²) of each kind of particles, of mean radius."""
     masses, inertias = list[Any](), list[Any]()
@@ -440,9 +445,15 @@ def bodies(scenes: Scene | Family) -> tuple[list[Any], list[Any]]:
     return masses, inertias
 
 
-def _particle(scenes: Scene | Family, kind: Ints, radius: Floats | None) -> Particle:
+def _particle(
+    scenes: Scene | Family,
+    masses: list[Any],
+    inertias: list[Any],
+    kind: Ints,
+    radius: Floats | None,
+) -> Particle:
     """Return the particles: numbers if all are alike, else arrays (N,)."""
-    scene, (masses, inertias) = scenes.scene, bodies(scenes)
+    scene = scenes.scene
     nominal: Any
     if isinstance(scenes, Family):
         nominal, first = scenes.value(scene.particle, "radius"), scene.kinds[0]

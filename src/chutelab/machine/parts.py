@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, isnan, nan, pi
+from math import inf, isnan, nan, pi, sqrt
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
@@ -63,8 +63,15 @@ class Particle:
 
     def of(self, index: Any) -> Particle:
         """Return some of the particles by their numbers."""
+        if not any(isinstance(value, np.ndarray) for value in vars(self).values()):
+            return self
         own = (value[index] if np.ndim(value) else value for value in vars(self).values())
         return Particle(*own)
+
+    @property
+    def largest(self) -> float:
+        """The largest radius, m."""
+        return self.radius if isinstance(self.radius, float) else float(np.max(self.radius))
 
     def kinetic(self, vx: ArrayLike, vy: ArrayLike, omega: ArrayLike) -> Floats:
         """Return ½ m v² + ½ I ω² (J) for arrays of any one shape (m/s, rad/s)."""
@@ -162,6 +169,8 @@ def pace_of(gravity: Any) -> Any:
     √(g / 9.81 m/s²), and 1 without gravity: a run repeats if all its speeds are twice as high, all
     its times half as long, and gravity is four times as strong.
     """
+    if isinstance(gravity, float):
+        return sqrt((gravity if gravity > 0.0 else EARTH) / EARTH)
     return np.sqrt(np.where(np.greater(gravity, 0.0), gravity, EARTH) / EARTH)
 
 

@@ -45,7 +45,7 @@ class Releases:
 
     def __post_init__(self) -> None:
         for array in vars(self).values():
-            array.flags.writeable = False
+            array.setflags(write=False)
 
 
 @dataclass(frozen=True)
@@ -146,11 +146,12 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
     """
     scene, family = scenes.scene, scenes if isinstance(scenes, Family) else None
     counts = [stream.count for stream in scene.streams]
-    corners = np.array([corner for kind in scene.particles for corner in kind.outline])
+    corners = [corner for kind in scene.particles for corner in kind.outline]
     members, streams = module.structs["Plan"].members, len(counts)
     drawing = module.structs["Drawing"]
     drawing.looks = LOOKS
-    module.fill("Drawing", corners=corners.reshape(-1))
+    if corners:
+        module.fill("Drawing", corners=np.array(corners).reshape(-1))
     while Status(module.call("draw")) is Status.PAUSED:
         watch()
 
@@ -170,13 +171,13 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
         velocity=starts["velocity"].copy(),
         omega=starts["omega"].copy(),
         angle=starts["angle"].copy(),
-        carried=carried.reshape(members, streams).repeat(counts, axis=1).reshape(-1),
-        stream=np.tile(np.arange(streams).repeat(counts), members),
+        carried=carried.repeat(counts * members),
+        stream=np.array([*range(streams)] * members).repeat(counts * members),
         kind=np.array(scene.kinds).repeat(counts) if family is None else np.arange(len(family)),
         exit_box=starts["exit_box"].copy(),
     )
     radius = starts["radius"].copy()
-    alike = family is not None and family.each == 1
+    alike = len(radius) == 1 if family is None else family.each == 1
     alike = alike or bool((radius == radius[0]).all())
     return releases, None if alike else radius
 

@@ -60,7 +60,7 @@ class Pieces(ABC):
     def __post_init__(self) -> None:
         for array in vars(self).values():
             if isinstance(array, np.ndarray):
-                array.flags.writeable = False
+                array.setflags(write=False)
 
     def of(self, which: Any) -> Self:
         """Return some pieces by their numbers, or a single one with numbers instead of arrays.

@@ -375,7 +375,7 @@ class SceneTables(Table):
             (name, doing, when.touched)
             for name, one in named
             for doing in ("opens", "closes", "starts")
-            if (when := getattr(one, f"{doing}_when", None)) is not None
+            if (when := vars(one).get(f"{doing}_when")) is not None
         )
 
     @property

@@ -263,37 +263,35 @@ def _lay_out(module: core.Module, recording: Record) -> None:
     events = recording.events.view(_NUMBERS)
     unreal = sum(int(np.count_nonzero(~np.isfinite(events[name]))) for name in ("t", "rest"))
     interact = machine.interact or len(recording.swings) + len(recording.totals) > 0
-    passing = machine.pair_restitution[: None if interact else 0] < 0.0
+    passing = (machine.pair_restitution[: None if interact else 0] < 0.0).astype(INTEGER)
     laws: Any = module.structs["Laws"]
-    for name, value in (
-        ("particle_count", count), ("piece_count", rows.shape[-1]),
-        ("knot_count", len(recording.knots)),
-        ("row", recording.knots.dtype.itemsize // 8), ("book_rows", len(books) // 3),
-        ("surface_count", len(recording.surfaces)), ("engine", _ENGINES.index(recording.engine)),
-        ("interact", interact),
-        ("joined", len(machine.joints) > 0), ("alike", alike(recording)), ("each", rows.ndim > 1),
-        ("pulley", machine.pulley is not None), ("contacts", recording.contacts),
-        ("steps", recording.steps), ("unreal", unreal),
-        ("tilt", machine.tilt), ("dt", machine.step_of(recording.engine)),
-        ("mover_count", len(machine.movers)), ("swing_count", len(recording.swings)),
-        ("gained", recording.gained), ("unsolved", recording.unsolved.max(initial=0.0)),
-        ("largest", np.max(machine.particle.radius)), ("loose", machine.loose),
-        ("unit", recording.unit),
-        ("outline_count", len(outlines)), ("kind_count", len(passing)),
-    ):  # fmt: skip
-        setattr(laws, name, value)
+    laws.particle_count, laws.piece_count = count, rows.shape[-1]
+    laws.knot_count, laws.row = len(recording.knots), recording.knots.dtype.itemsize // 8
+    laws.book_rows, laws.surface_count = len(books) // 3, len(recording.surfaces)
+    laws.engine, laws.interact = _ENGINES.index(recording.engine), interact
+    laws.joined, laws.alike = len(machine.joints) > 0, alike(recording)
+    laws.each, laws.pulley = rows.ndim > 1, machine.pulley is not None
+    laws.contacts, laws.steps = recording.contacts, recording.steps
+    laws.unreal, laws.gained = unreal, recording.gained
+    laws.tilt, laws.dt = machine.tilt, machine.step_of(recording.engine)
+    laws.mover_count, laws.swing_count = len(machine.movers), len(recording.swings)
+    laws.unsolved = recording.unsolved.max(initial=0.0) if len(recording.unsolved) else 0.0
+    laws.largest, laws.loose, laws.unit = machine.particle.largest, machine.loose, recording.unit
+    laws.outline_count, laws.kind_count = len(outlines), len(passing)
     module.work("lay_out_laws")
-    movers = module.array("movers", core.dtype("Mover"), len(machine.movers), of="Laws")
-    for row, mover in zip(movers, machine.movers, strict=True):
-        mover.tell(row)
-        own = np.flatnonzero(recording.swings["surface"] == mover.surface)
-        row["first"], row["last"] = (own[0], own[-1]) if len(own) else (0, 0)
+    if machine.movers:
+        movers = module.array("movers", core.dtype("Mover"), len(machine.movers), of="Laws")
+        for row, mover in zip(movers, machine.movers, strict=True):
+            mover.tell(row)
+            own = np.flatnonzero(recording.swings["surface"] == mover.surface)
+            row["first"], row["last"] = (own[0], own[-1]) if len(own) else (0, 0)
+    if len(recording.swings):
+        module.fill("Laws", swings=recording.swings)
+    if len(outlines):
+        module.fill("Laws", angles=recording.angle, outlines=outlines.ravel())
     module.fill(
         "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
-        passing=passing.astype(INTEGER).ravel(),
-        barriers=rows.reshape(-1), books=books,
-        **({"swings": recording.swings} if len(recording.swings) else {}),
-        **({"angles": recording.angle, "outlines": outlines.ravel()} if len(outlines) else {}),
+        passing=passing.ravel(), barriers=rows.reshape(-1), books=books,
     )  # fmt: skip
 
 

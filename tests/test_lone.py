@@ -24,7 +24,8 @@ import numpy as np
 import pytest
 
 from chutelab.engines import contact, exact, pymunk
-from chutelab.engines.pymunk.world import DIGITS, HAIR
+from chutelab.engines.pymunk.faces import HAIR
+from chutelab.engines.pymunk.world import DIGITS
 from chutelab.machine import build
 from chutelab.results import Kind
 from chutelab.results.recorder import StalledError

@@ -313,6 +313,25 @@ def test_of_several_blows_at_one_instant_the_first_and_the_last_state_are_kept()
     assert found.track(1)["t"].tolist() == [0.0, 0.1]
 
 
+def test_single_knots_and_events_are_written_as_several_are():
+    """One by one and in arrays, in turn, they have the same bits and stay in their order."""
+    one, several = recorder_of(1, surfaces=["floor"]), recorder_of(1, surfaces=["floor"])
+    for n in range(6):
+        t, x, v, omega = 0.1 * n, (0.3 + n, -1e-7 * n), (2.0 / 3.0, n - 0.5), 1.0 / (n + 1.0)
+        blow = {"velocity_before": (0.1, -v[1]), "omega_before": 2.0 * omega, "surface": n % 2 - 1,
+                "normal_impulse": 0.01 / 3.0, "tangential_impulse": -1e-5 * n}  # fmt: skip
+        for recorder in (one, several):
+            recorder.book(0, 0, 0.1 * n, 1e-3 / 3.0, 7e-9)
+            single = recorder is one and n % 3
+            (recorder.knot if single else recorder.knots)(0, t, x, v, omega)
+        one.event(Kind.IMPACT, 0, t, x, v, omega, **blow)
+        several.events(Kind.IMPACT, 0, t, x, v, omega, **blow)
+    found, expected = finish(one), finish(several)
+    assert found.knots.tobytes() == expected.knots.tobytes()
+    assert found.events.tobytes() == expected.events.tobytes()
+    assert np.diff(found.knots["t"]).min() > 0.0
+
+
 DRUM = {
     "particle": {"radius": 0.005, "mass": 0.002, "spin": True},
     "surface": [{"name": "drum", "center": [0.0, 0.0], "radius": 0.06, "speed": 0.3,

@@ -7,8 +7,10 @@ world's origin have few digits left.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from math import ceil, log2
+from struct import Struct
 from typing import Any
 
 import numpy as np
@@ -170,6 +172,34 @@ class Recorder:
         self._owners: list[Ints] = []
         self._angles: list[Floats] = []
         self._events: list[NDArray[Any]] = []
+        # Numbers of single knots, of `KNOT`, and their particles and angles; bytes of events.
+        self._numbers: list[float] = []
+        self._singles: list[tuple[int, float]] = []
+        self._bytes: list[bytes] = []
+
+    def knot(
+        self,
+        particle: int,
+        t: float,
+        position: Iterable[float],
+        velocity: Iterable[float],
+        omega: float,
+        angle: float = 0.0,
+    ) -> None:
+        """Add one knot, as `knots` does, in a tenth of the time."""
+        self._numbers += t, *position, *velocity, omega, *self.entries[particle].tolist()
+        self._singles.append((particle, angle))
+
+    def _gather(self) -> None:
+        """Put single knots and events to the others."""
+        if self._singles:
+            owners, angles = zip(*self._singles, strict=True)
+            knots = np.array(self._numbers, dtype=float).view(KNOT)
+            self._numbers, self._singles = [], []
+            self.add(np.array(owners), knots, np.array(angles))
+        if self._bytes:
+            self._events.append(np.frombuffer(b"".join(self._bytes), EVENT))
+            self._bytes = []
 
     def knots(
         self,
@@ -196,6 +226,7 @@ class Recorder:
 
         Angles (rad) are kept if some are boxes or polygons.
         """
+        self._gather()
         self._knots.append(knots)
         self._owners.append(particle)
         if self._angular:
@@ -250,6 +281,27 @@ class Recorder:
         chunk["normal_impulse"], chunk["tangential_impulse"] = normal_impulse, tangential_impulse
         self._events.append(chunk)
 
+    def event(
+        self,
+        kind: Kind,
+        particle: int,
+        t: float,
+        position: Iterable[float],
+        velocity: Iterable[float],
+        omega: float,
+        *,
+        velocity_before: Iterable[float],
+        omega_before: float,
+        surface: int = -1,
+        normal_impulse: float = 0.0,
+        tangential_impulse: float = 0.0,
+    ) -> None:
+        """Add one event of one particle, as `events` does, in a tenth of the time."""
+        self._bytes.append(_PACKED.pack(
+            t, particle, -1, kind, surface, *position, *velocity_before, *velocity,
+            omega_before, omega, normal_impulse, tangential_impulse,
+        ))  # fmt: skip
+
     def whole(self, record: Record, stalled: StalledError | None) -> Record:
         """Return a run's record; if a particle got stuck, raise the error with the record."""
         if stalled is None:
@@ -260,6 +312,7 @@ class Recorder:
 
     def finish(self, *, engine: str, steps: int) -> Record:
         """Sort what was collected, and freeze it."""
+        self._gather()
         count = len(self.ended)
         owners = _joined(self._owners, np.dtype(np.int64))
         place = None
@@ -354,6 +407,9 @@ class Recorder:
         )
 
 
+_PACKED = Struct("=diibh10d")
+"""A row of `EVENT` as bytes."""
+
 _ITEM = np.dtype(f"V{KNOT.itemsize}")
 """A knot as bytes, which are copied whole."""
 
@@ -387,6 +443,9 @@ def _joined(
     return whole
 
 
+_X, _V = slice(1, 3), slice(3, 5)
+"""Rows of places and velocities in `Tracks.last`."""
+
 ROUGH = 1e-4
 """Largest error of a track between two knots, as a share of the radius."""
 
@@ -404,17 +463,24 @@ class Tracks:
     ) -> None:
         self.recorder, self.first, count = recorder, particles.start, len(particles)
         self.turning, self.radius, self.tolerance = turning, radius, ROUGH * radius
-        self.t, self.x, self.v = np.zeros(count), np.zeros((2, count)), np.zeros((2, count))
+        # The last knots: t, x, v and ω.
+        self.last = np.zeros((6, count))
+        self.t, self.x, self.v, self.omega = (self.last[rows] for rows in (0, _X, _V, 5))
         self.pull, self.fresh = np.zeros((2, count)), np.ones(count, dtype=bool)
-        self.omega, self.twist = np.zeros((2, count))
+        self.twist = np.zeros(count)
 
     def knot(
-        self, i: int, t: float, x: ArrayLike, v: ArrayLike, omega: float = 0.0, angle: float = 0.0
+        self,
+        i: int,
+        t: float,
+        x: Sequence[float] | Floats,
+        v: Sequence[float] | Floats,
+        omega: float = 0.0,
+        angle: float = 0.0,
     ) -> None:
         """Write a knot of the particle in a row, with the entries booked so far."""
-        self.recorder.knots(self.first + i, t, x, v, omega, angle)
-        self.t[i], self.x[:, i], self.v[:, i], self.fresh[i] = t, x, v, True
-        self.omega[i] = omega
+        self.recorder.knot(self.first + i, t, x, v, omega, angle)
+        self.last[:, i], self.fresh[i] = (t, *x, *v, omega), True
 
     def step(
         self,

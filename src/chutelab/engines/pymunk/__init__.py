@@ -2,7 +2,8 @@
 
 It shares only the machine and the recorder with the other engines: an independent check.
 
-- `world`: the surfaces as a `pymunk.Space`; rides by adhesion; paths between contacts.
+- `faces`: surfaces as one particle meets them; free flight.
+- `world`: the surfaces as a `pymunk.Space`; where a path meets them; rides by adhesion.
 - `lone`: one particle whose steps end at its contacts.
 - `shared`: all particles in one Space, in steps of equal length.
 - `moving`: moving surfaces; strings, rods, springs and pins; rolling friction.
@@ -40,7 +41,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     Raises a `ValueError` if a particle has no radius; a `StalledError`, which has the recording so
     far, if a lone particle makes no progress.
     """
-    if np.min(machine.particle.radius) <= 0.0:
+    if np.count_nonzero(np.less_equal(machine.particle.radius, 0.0)):
         raise ValueError("particle.radius = 0: pymunk needs disks with a radius above 0 m")
     recorder, steps, stuck = Recorder(machine), 0, None
     machine = recorder.near
@@ -53,12 +54,12 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
             told = perf_counter()
             progress(share)
 
-    world = World(machine)
+    boxes = any(outline is not None for outline in machine.outlines)
+    apart = not (machine.interact or boxes or machine.joints or machine.movers)
+    apart = apart and not (machine.triggers or machine.scene.one_sided) and machine.align
+    world = World(machine, alone=apart)
     try:
-        boxes = any(outline is not None for outline in machine.outlines)
-        apart = not (machine.interact or boxes or machine.joints or machine.movers)
-        apart = apart and not (machine.triggers or machine.scene.one_sided)
-        if not (apart and machine.align):
+        if not apart:
             shared = Shared(machine, world, recorder)
             try:
                 shared.run(report)
@@ -68,7 +69,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
             alike = len(machine.pair_restitution) == 1 and not np.ndim(machine.particle.radius)
             for i in range(machine.count):
                 if not alike:
-                    world = World(machine, i)
+                    world = World(machine, i, alone=True)
                 lone = Lone(machine, world, recorder, i, report)
                 try:
                     lone.run()

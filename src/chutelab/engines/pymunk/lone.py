@@ -19,16 +19,8 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d
 
-from chutelab.engines.pymunk.world import (
-    LOW,
-    PARTICLE,
-    SHORT,
-    SURFACE,
-    Carriage,
-    Face,
-    Flight,
-    World,
-)
+from chutelab.engines.pymunk.faces import Face, Flight
+from chutelab.engines.pymunk.world import LOW, PARTICLE, SHORT, SURFACE, Carriage, World
 from chutelab.machine import Machine
 from chutelab.results.record import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder, StalledError, Tracks
@@ -72,6 +64,10 @@ They take 2 to 8 s. A ride round 1/1000 of the radius at 1 m/s needs a third of 
 
 TURNS = 200
 """Impacts at one instant, one surface after the other, before all are solved together."""
+
+
+NOTHING, EVERYTHING = pymunk.ShapeFilter(mask=0), pymunk.ShapeFilter()
+"""What a disk collides with in flight, and else."""
 
 
 class Contact(NamedTuple):
@@ -120,8 +116,8 @@ class Lone:
         self.recorder, self.particle, self.report = recorder, particle, report
         start = machine.releases
         self.r, self.g, self.dt = world.radius, machine.gravity, machine.dt
-        self.pull, self.pace = Vec2d(*(-self.g * machine.up)), world.pace
-        self.t = float(start.t[particle])
+        self.pull, self.pace = Vec2d(*(-self.g * machine.up).tolist()), world.pace
+        self.t = self.begin = float(start.t[particle])
         self.x = Vec2d(*start.position[particle].tolist())
         self.v = Vec2d(*start.velocity[particle].tolist())
         self.omega = float(start.omega[particle])
@@ -178,7 +174,7 @@ class Lone:
                     room = min(room, gap)
             slow = max(self.world.tiny, SEAM if self.on >= 0 else 0.0) * (self.pace + self.v.length)
             if any(self.v.dot(normal) < -slow for normal in touching.values()):
-                self._blow(touching)
+                self._blow(touching, near)
             elif released or not self._ride(touching, room):
                 self._fly(touching, near)
             released = False
@@ -194,8 +190,8 @@ class Lone:
 
     def _look(self) -> None:
         """Report the progress; end the track here if the caller asks for it."""
-        span = self.machine.end_time - float(self.machine.releases.t[self.particle])
-        left = 0.0 if self.ended else (self.machine.end_time - self.t) / span
+        end = self.machine.end_time
+        left = 0.0 if self.ended else (end - self.t) / (end - self.begin)
         try:
             self.report((self.particle + 1.0 - left) / self.machine.count)
         except EnoughError:
@@ -305,22 +301,23 @@ class Lone:
                 span, reason = met, ""
         if span > 0.0:
             # Exact, so one step is enough.
-            self.restitution = {}
-            self._step(self.x, self.v + 0.5 * span * self.pull, self.omega, span, self.pull)
+            self.restitution, self.circle.filter = {}, NOTHING
+            self._step(self.x, path.at(0.5 * span)[1], self.omega, span, self.pull)
+            self.circle.filter = EVERYTHING
             self.t += span
-            self.x, self.v = self.body.position, self.v + span * self.pull
+            self.x, self.v = self.body.position, path.at(span)[1]
         if reason:
             self._end(reason, Kind.EXIT if reason == "exit" else None)
         else:
             self._knot()
 
-    def _blow(self, touching: dict[Face, Vec2d]) -> None:
+    def _blow(self, touching: dict[Face, Vec2d], near: dict[Face, tuple[float, Vec2d]]) -> None:
         """Have Chipmunk resolve the impact on the surface that the particle approaches fastest."""
         before = self.v, self.omega
         if self.on >= 0:
             self._knot()
         struck = min(touching, key=lambda face: self.v.dot(touching[face]))
-        gap, normal = struck.gap(self.x)
+        gap, normal = near[struck]
         self.x -= gap * normal
         self.blows = self.blows + 1 if self.t == self.struck else 0
         self.struck = self.t
@@ -331,9 +328,7 @@ class Lone:
         self.v, self.omega = self.body.velocity, self.body.angular_velocity
         for contact in pushed:
             self._book(contact, before)
-            normal = contact.normal
-            push = contact.push * normal + contact.rub * Vec2d(normal.y, -normal.x)
-            self._bear(contact, self.x, push)
+            self._bear(contact, self.x)
             lands = contact.face.surface == self.machine.landing and not self.landed
             self.landed |= lands
             kind = Kind.LANDING if lands else Kind.IMPACT
@@ -472,12 +467,10 @@ class Lone:
             self._tell(Kind.SLIP if slips else Kind.STICK, surface)
         for contact in end.contacts:
             self._book(contact, motion)
-            normal = contact.normal
-            push = contact.push * normal + contact.rub * Vec2d(normal.y, -normal.x)
-            if len(end.contacts) == 1:
-                # On a curved surface its velocity is also turned.
-                push = self.body.mass * (end.v - motion[0] - h * self.pull)
-            self._bear(contact, end.middle, push, h)
+            # On a curved surface its velocity is also turned.
+            alone = len(end.contacts) == 1
+            gained = end.v - motion[0] - h * self.pull if alone else None
+            self._bear(contact, end.middle, h, gained)
         if self.t > self.tracks.t[0]:
             state = np.array([before, (*self.x, *self.v, self.omega)])[:, :, None]
             self.tracks.step(np.array([True]), (self.t - h, self.t), state, entries)
@@ -537,18 +530,27 @@ class Lone:
     ) -> None:  # fmt: skip
         """Write an event; an impact with its impulses."""
         v, omega = before or (self.v, self.omega)
-        self.recorder.events(
+        self.recorder.event(
             kind, self.particle, self.t, self.x, self.v, self.omega, velocity_before=v,
             omega_before=omega, surface=surface, normal_impulse=push, tangential_impulse=rub,
         )  # fmt: skip
 
-    def _bear(self, contact: Contact, x: Vec2d, push: Vec2d, span: float = 0.0) -> None:
-        """Count an impulse (N s) as a load, of a time (s) up to now."""
+    def _bear(
+        self, contact: Contact, x: Vec2d, span: float = 0.0, gained: Vec2d | None = None
+    ) -> None:
+        """Count an impulse as a load, of a time (s) up to now; `gained` is the whole change of v.
+
+        Without `gained` it is what Chipmunk solved.
+        """
         if self.recorder.bins is not None:
-            place, surface = x - self.r * contact.normal, contact.face.surface
+            normal = contact.normal
+            push = contact.push * normal + contact.rub * Vec2d(normal.y, -normal.x)
+            if gained is not None:
+                push = self.body.mass * gained
             self.recorder.bins.bear(
-                surface, self.t - span, self.t, place, contact.normal, push, contact.couple
-            )
+                contact.face.surface, self.t - span, self.t, x - self.r * normal, normal, push,
+                contact.couple,
+            )  # fmt: skip
 
     def _book(self, contact: Contact, before: tuple[Vec2d, float]) -> None:
         """Book an impulse J: J·(u before + u now)/2, u the relative velocity at the contact."""

@@ -17,7 +17,8 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d
 
-from chutelab.engines.pymunk.world import DIGITS, Face, World
+from chutelab.engines.pymunk.faces import Face
+from chutelab.engines.pymunk.world import DIGITS, World
 from chutelab.machine import Joint, Machine, Mover
 from chutelab.util.arrays import Bools, Floats, Ints
 

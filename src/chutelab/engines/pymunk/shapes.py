@@ -10,7 +10,8 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d
 
-from chutelab.engines.pymunk.world import GRIP, PARTICLE, SURFACE, Bend, Face, World
+from chutelab.engines.pymunk.faces import Bend, Face
+from chutelab.engines.pymunk.world import GRIP, PARTICLE, SURFACE, World
 from chutelab.machine import Machine
 from chutelab.util.arrays import Floats
 

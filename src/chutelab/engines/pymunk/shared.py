@@ -26,9 +26,10 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d, batch
 
+from chutelab.engines.pymunk.faces import NONE, Bend, Flight
 from chutelab.engines.pymunk.moving import Moving, Rolling, Ties
 from chutelab.engines.pymunk.shapes import Shapes
-from chutelab.engines.pymunk.world import NONE, PARTICLE, SURFACE, Bend, Carriage, Flight, World
+from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Carriage, World
 from chutelab.machine import SWING, Machine
 from chutelab.results.loads import Bins
 from chutelab.results.record import REASONS, Kind
@@ -337,7 +338,7 @@ class Shared:
             for face in self.shapes.gates if doing != "starts" else ():
                 if face.surface == surface:
                     clock = "vanishes" if doing == "opens" else "appears"
-                    object.__setattr__(face, clock, self.t)
+                    setattr(face, clock, self.t)
 
     def _contacts(self) -> None:
         """Book contacts; record impacts, landings and which particle rides which surface."""

@@ -24,15 +24,15 @@ CORE = Path(__file__).parents[1] / "src" / "chutelab" / "core"
 EXPORTS = (
     "room", "world", "lay_out_world", "prepare", "prepare_to_judge", "run", "run_and_judge", "plan",
     "lay_out_plan", "build", "drawing", "draw", "exact", "lay_out_exact", "follow_and_judge",
-    "run_exact", "run_world", "loads", "lay_out_bins", "laws", "lay_out_laws", "judge", "sine",
-    "cosine", "angle_of", "angle_of_cosine", "push_disk", "turn_hinge", "steer",
+    "run_exact", "run_world", "loads", "lay_out_bins", "laws", "lay_out_laws", "judge", "opened",
+    "sine", "cosine", "angle_of", "angle_of_cosine", "push_disk", "turn_hinge", "steer",
     "pack_events", "pack_knots",
 )  # fmt: skip
 """What a host can call."""
 
 PYTHON = (
     "prepare_to_judge", "run_and_judge", "exact", "lay_out_exact", "follow_and_judge", "run_exact",
-    "run_world", "steer", "pack_events", "pack_knots",
+    "run_world", "opened", "steer", "pack_events", "pack_knots",
 )  # fmt: skip
 """Of these what no page calls."""
 

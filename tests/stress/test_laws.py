@@ -1,15 +1,19 @@
 """Every law is kept by a run as it is, and broken by one with a number in it moved."""
 
 from dataclasses import replace
+from itertools import combinations
 from math import nan
 
 import numpy as np
 import pytest
 
+import crowds
 from chutelab import machine
 from chutelab.checks import stress as laws
 from chutelab.checks.stress import Evidence, Verdict, barriers, judge
-from chutelab.results import Kind
+from chutelab.engines import contact
+from chutelab.results import Kind, Recording
+from references import surface_depths
 from stress.case import TRANSFER, merged, scene_of, surface, thrown
 from stress.runs import FLOOR, HOP, PAIR, adder, evidence
 
@@ -162,6 +166,44 @@ def test_one_faster_particle_breaks_the_laws_of_a_crowd(law):
 
     assert law(crowd()).holds
     assert not law(crowd(knots=push)).holds
+
+
+def may_open(recording, t):
+    """Σ M / 0.012 (p δ / dt)², over disks and surfaces at a time: J, of docs/physics.md."""
+    m, found = recording.machine, []
+    (x,), _ = recording.at([t])
+    there = np.flatnonzero(np.isfinite(x[:, 0]))
+    x, r = x[there], np.broadcast_to(m.particle.radius, recording.count)[there]
+    for i, j in combinations(range(len(x)), 2):
+        found.append((r[i] + r[j] - np.hypot(*(x[i] - x[j])), min(r[i], r[j])))
+    for depths in surface_depths(m, x, r, t):
+        found += zip(depths, r, strict=True)
+    depth, least = np.array([one for one in found if one[0] > 0.0]).reshape(-1, 2).T
+    beyond = np.maximum(depth / least - 5e-4, 0.0)
+    part = np.minimum(np.clip(depth / least / 0.03, 0.1, 1.0) * beyond, 0.01) * least
+    return np.max(m.particle.mass) / 0.012 * float(((part / m.dt) ** 2).sum())
+
+
+def test_removed_overlaps_may_give_a_crowd_energy_up_to_their_bound_in_each_step():
+    """60 disks in a funnel, without gravity: at one step overlaps give 4e-4 of the energy."""
+    recording = Recording.of(contact.run(crowds.crowd(98, count=60)[1]))
+    assert recording.gravity == 0.0
+    good = laws.energy(Evidence(recording))
+    assert good.holds
+    assert good.bound <= 1e-9
+    totals, turned = recording.totals, Evidence(recording).bounds.energy
+    lost = totals["entries"][:, 1:].sum(axis=1)  # without gravity and drives: what was taken
+    given = -np.diff(lost)
+    k = int(np.argmax(given))
+    most = max(may_open(recording, t) for t in totals["t"][k : k + 2])
+    assert 1e-4 * turned < given[k] < most
+    assert not any(may_open(recording, t) for t in totals["t"][:2])
+    for step, room in ((k, most - given[k]), (0, 0.0)):
+        for share, holds in ((-1e-9, True), (3e-9, False)):
+            more = totals.copy()
+            more["kinetic"][step + 1 :] += room + share * turned
+            verdict = laws.energy(Evidence(replace(recording, totals=more)))
+            assert verdict.holds == holds
 
 
 def test_a_turn_more_breaks_angular_momentum_only():

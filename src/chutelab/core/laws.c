@@ -440,8 +440,9 @@ static void sort(int *numbers, int count, const double *rows, int row) {
 
 /* Energy that the removal of overlaps may give in a step at a time, J. A solve raises the kinetic energy by at most the
    sum of J a, where J is the impulse of a contact and a the speed at which it is to open. An overlap d opens like a
-   spring: a = p d / h - c J, with c = GIVES / M. So J a is at most (p d / h)^2 / (4 c). */
-static double opened(double t) {
+   spring: a = p d / h - c J, with c = GIVES / M. So J a is at most (p d / h)^2 / (4 c). The host may ask for it once the
+   run has been judged. */
+EXPORT double opened(double t) {
     double step = L.dt, sum = 0, *at = L.places;
     int *there = L.order, count = 0;
     if (All.gravity > 0) step = MIN(step, sqrt(FALL * All.smallest / All.gravity));

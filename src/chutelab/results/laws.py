@@ -7,6 +7,7 @@ The core finds broken laws (laws.c, barriers.c); the words are here. `Recording.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import hypot, nan, sqrt
 from typing import Any, NamedTuple
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from chutelab import core
 from chutelab.machine import Machine
 from chutelab.results.record import EVENT, Record
+from chutelab.util.arrays import Floats
 from chutelab.util.tables import number
 
 FINITE, THROUGH, INSIDE = "finite numbers", "nothing through a surface", "nothing inside a surface"
@@ -221,6 +223,20 @@ def examine(recording: Record) -> Findings:
             core.give_back(module)
     found: Findings = recording.found[_FOUND]
     return found
+
+
+def opened(recording: Record, times: Iterable[float]) -> Floats:
+    """Return the energy (J) that removing overlaps may give in a step at each time (s).
+
+    The recording is one of a crowd of the contact engine.
+    """
+    module = core.borrow()
+    try:
+        _lay_out(module, recording)
+        module.work("judge")
+        return np.array([module.call("opened", t) for t in times])
+    finally:
+        core.give_back(module)
 
 
 _NO_BREACHES, _NO_HITS = np.empty(0, core.dtype("Breach")), np.empty(0, core.dtype("Hit"))

@@ -1,14 +1,17 @@
 """Libraries that are too old are told from those that do, and pyproject.toml says which."""
 
 import os
+import re
 import runpy
 import subprocess
 import sys
 import tomllib
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 
+from chutelab.util import errors
 from chutelab.util.errors import MissingLibraryError, library, too_old
 
 ROOT = Path(__file__).parent.parent
@@ -33,6 +36,18 @@ def test_a_package_that_is_too_old_is_named(tmp_path, monkeypatch, version, fits
     installed(tmp_path, "numpy", "2.0.0rc1")
     monkeypatch.syspath_prepend(tmp_path)
     assert too_old() == ([] if fits else [f"pydantic>=2.9 ({version} is installed)"])
+
+
+def test_packages_are_found_as_python_finds_them(tmp_path, monkeypatch):
+    installed(tmp_path, "Some.old_Name", "1.5rc2")
+    (tmp_path / "other_name-2.5-py3.11.egg-info").mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    found = {name: version for name, (version, _) in errors.installed().items()}
+    assert found["some-old-name"] == "1.5rc2"
+    assert found.pop("other-name") == "2.5"  # without METADATA Python has no version of it
+    every = [one for one in metadata.distributions() if one.metadata["Name"]]
+    names = [re.sub(r"[-_.]+", "-", one.metadata["Name"]).lower() for one in every]
+    assert found == dict(zip(names[::-1], [one.version for one in every][::-1], strict=True))
 
 
 def test_no_command_goes_on_with_a_library_that_is_too_old(tmp_path):

@@ -16,7 +16,6 @@ from contextlib import suppress
 from enum import IntEnum
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,7 +25,7 @@ import numpy as np
 import wasmtime
 from numpy.typing import NDArray
 
-from chutelab.util.files import whole
+from chutelab.util.files import version_of, whole
 
 LARGE = 64 * 2**20
 """A used memory larger than this, in bytes, is freed instead of kept for the next run."""
@@ -237,7 +236,7 @@ def _compiled() -> tuple[wasmtime.Engine, wasmtime.Module]:
     engine, source = wasmtime.Engine(), (files(__package__) / "core.wasm").read_bytes()
     # Kept for this version of wasmtime in the user's cache folder.
     folder = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
-    name = sha256(source + version("wasmtime").encode("ascii")).hexdigest()[:16]
+    name = sha256(source + str(version_of("wasmtime")).encode("ascii")).hexdigest()[:16]
     home = Path(folder) if folder else Path("~/.cache").expanduser()
     kept = home / "chutelab" / f"{name}.core"
     with suppress(OSError, wasmtime.WasmtimeError):

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import difflib
 import json
+import os
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import Any, Final
 
 
@@ -187,7 +190,29 @@ def library(module: str, what: str, extra: str) -> Any:
 _BOUND = re.compile(
     r"^Requires-Dist: ([\w.-]+)[^>;\n]*>=([\d.]+)(?:.*extra == .([\w-]+))?", re.MULTILINE
 )
-_VERSION = re.compile(r"^Version: (.+)$", re.MULTILINE)
+
+
+def installed() -> dict[str, tuple[str, str]]:
+    """Return version and folder of metadata of each installed package, by its name.
+
+    Names are in small letters, with hyphens. As `importlib.metadata` finds them, but only by the
+    names of the folders: a tenth of the time.
+    """
+    found = {}
+    for place in reversed(sys.path):
+        with suppress(OSError):
+            for folder in os.listdir(place or "."):  # noqa: PTH208
+                if folder.endswith("-info") and folder.count("-") > 1:
+                    package, version = folder.removesuffix(".dist-info").split("-")[:2]
+                    found[_plain(package)] = (
+                        version.removesuffix(".egg"),
+                        f"{place or '.'}/{folder}",
+                    )
+    return found
+
+
+def _plain(package: str) -> str:
+    return package.replace("_", "-").replace(".", "-").lower()
 
 
 def too_old(extra: str | None = None) -> list[str]:
@@ -196,23 +221,16 @@ def too_old(extra: str | None = None) -> list[str]:
     Such as "pydantic>=2.9 (2.7.0 is installed)". By default of those that it always needs, else of
     one extra. Empty if chutelab itself is not installed.
     """
-    found = []
-    for bound in _BOUND.finditer(_metadata("chutelab")):
+    found, there = list[str](), installed()
+    needs = ""
+    with suppress(KeyError, OSError):
+        needs = Path(there["chutelab"][1], "METADATA").read_text(encoding="utf-8")
+    for package, bound, brings in _BOUND.findall(needs):
         # Missing packages are reported by their import.
-        said = _VERSION.search(_metadata(bound[1])) if bound[3] == extra else None
-        if said is not None and _numbers(said[1]) < _numbers(bound[2]):
-            found.append(f"{bound[1]}>={bound[2]} ({said[1]} is installed)")
+        version, _ = there.get(_plain(package), ("", ""))
+        if version and brings == (extra or "") and _numbers(version) < _numbers(bound):
+            found.append(f"{package}>={bound} ({version} is installed)")
     return found
-
-
-def _metadata(package: str) -> str:
-    """Return the METADATA of a package as text, which is fast; "" if it is not installed."""
-    # Imported here, as the help of a command does not need it.
-    from importlib.metadata import PackageNotFoundError, distribution
-
-    with suppress(PackageNotFoundError):
-        return distribution(package).read_text("METADATA") or ""
-    return ""
 
 
 def _numbers(version: str) -> tuple[int, ...]:

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final
 
-from chutelab.util.errors import InputError, printable
+from chutelab.util.errors import InputError, installed, printable
 from chutelab.util.signals import held
 
 _ASIDE: Final = ".chutelab-unfinished-"
@@ -284,12 +284,8 @@ def version_of(package: str) -> str | None:
     >>> version_of("no such package") is None
     True
     """
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
+    version, _ = installed().get(package.lower(), (None, None))
+    return version
 
 
 def own_version() -> str:

@@ -334,7 +334,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         Trigger(names.index(name), doing, names.index(by)) for name, doing, by in scene.triggers
     )
     machine = Machine(
-        **_keys(scenes),
+        **(_keys(scenes) if family is not None or scene._ahead is None else scene._ahead[0]),
         gravity=value(scene, "gravity"),
         particle=particle,
         **parts,
@@ -371,11 +371,11 @@ def ahead(scene: Scene) -> Machine:
             # Hinges can be checked only after they are weighed.
             return build(scene)
         without = {name: () for name in ("joints", "movers") if not getattr(scene, name)}
-        known = scene._ahead = {
-            "build": build, "count": scene.count, "triggers": (), **_keys(scene), **without
-        }  # fmt: skip
+        only = {"build": build, "count": scene.count, "triggers": (), **without}
+        known = scene._ahead = _keys(scene), only
     machine = object.__new__(Machine)
-    vars(machine).update(known)
+    for part in known:
+        vars(machine).update(part)
     return machine
 
 

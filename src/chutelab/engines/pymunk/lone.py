@@ -185,7 +185,10 @@ class Lone:
                 self._stall("its blows never end")
             elif self.steps - done + rounds > WINDOW:
                 self._stall(f"{WINDOW} steps gain less than {GAINED} times run.dt")
-        self.world.space.remove(self.body, self.circle)
+        space, none = self.world.space, pymunk.empty_callback
+        space.remove(self.body, self.circle)
+        # Else its arrays would wait for the garbage collector, as the Space and its shapes do.
+        space.on_collision(PARTICLE, SURFACE, pre_solve=none, post_solve=none)
         self._look()
 
     def _look(self) -> None:

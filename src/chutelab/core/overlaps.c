@@ -1,6 +1,6 @@
 /* Whether particles are inside each other: followed along their tracks, at all times of a run.
 
-   A run is divided into spans of time in which particles move by about their radius or have two knots. In most
+   A run is divided into spans of time in which particles move by about two radii or have two knots. In most
    spans two stay apart by their places at both ends and by how far they stray from an even motion. Others are
    followed from knot to knot, in strides in which they cannot get too deep into each other: the gap now, and what
    may be, divided by the greatest speed at which they come nearer. Gaps are those along the best separating axis.
@@ -245,7 +245,7 @@ static void follow_two(const Couple *two, double t, double end) {
 }
 
 /* Set how far each particle reaches and forget what was found. Return into how many spans to divide the run: in one a
-   particle moves by its radius or has two knots on average, but no span is without a knot. */
+   particle moves by two radii or has two knots on average, but no span is without a knot. */
 static int prepare(double *begin, double *end) {
     double way = 0, size = 0;
     *begin = INFINITY;
@@ -268,7 +268,7 @@ static int prepare(double *begin, double *end) {
             way += length_of(KNOT(k + 1)[1] - KNOT(k)[1], KNOT(k + 1)[2] - KNOT(k)[2]);
     }
     double knots = L.offsets[L.particle_count];
-    return 1 + (int)MAX(0.5 * knots / L.particle_count, MIN(way / size, knots));
+    return 1 + (int)MAX(0.5 * knots / L.particle_count, MIN(way / (2 * size), knots));
 }
 
 /* Whether two cannot get too deep into each other from t to `end`, and need not be followed. Their circles are

@@ -12,11 +12,6 @@
 #define LATE 5e-3
 #define MORE 1e-3
 #define LATE_CORNERS 2e-3
-/* An impact of two particles in a pile has no restitution up to W.soft. If the pair has a restitution of ELASTIC or more, it
-   has none up to so many times that speed along gravity: else piles of smooth disks never come to rest, as each fall makes
-   an overlap, and its removal lifts what falls next. */
-#define ELASTIC 0.9
-#define LULLED 4.0
 
 /* ------------------------------------------------------------------ the next event of each disk */
 
@@ -112,7 +107,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
    end of the step they may approach by `overlap`, see LATE. */
 static double left_late(const Disk *a, const Disk *b, double overlap, double most, double t) {
     if (!W.interact || !(a->supports || b->supports) || !(t < W.step_end)) return 0;
-    return MIN(most, overlap / (W.step_end - t));
+    return MIN(most, W.eager * overlap / (W.step_end - t));
 }
 
 /* Approach up to which two disks are left to the next step at t, where their gap is negative if they overlap, m/s. */
@@ -484,12 +479,6 @@ int is_alone(const Contact *c, const double *before) {
     return fabs(change - size) <= SAME_IMPULSE * size;
 }
 
-/* Approach below which an impact of two particles in a pile has no restitution, m/s. */
-static double lulled(const Contact *c) {
-    if (c->rest < ELASTIC) return W.soft;
-    return W.soft + 2 * (LULLED - 1) * W.step * fabs(W.gx * c->nx + W.gy * c->ny);
-}
-
 /* Resolve the impact of disk i with disk j, or with surface k as j = -1 - k, with Newton's restitution and Coulomb's
    friction. */
 static void strike(int i, int j, double t) {
@@ -528,7 +517,7 @@ static void strike(int i, int j, double t) {
         double range = TOUCH * (j < 0 ? a->radius : MIN(a->radius, b->radius));
         back = sqrt(MAX(square(back) - 2 * cohesion * range / c.mass[0], 0));
     }
-    if (j >= 0 && -u[0] < lulled(&c) && (a->supports || b->supports || !c.two)) back = 0;
+    if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
     int jammed = impacts >= (j >= 0 ? CROWDED : c.rest < 1 ? JAM : CROWDED);
     int slow = c.rest < 1 && impacts >= FEW && -u[0] < SLOW * W.g * W.dt;
     jammed |= slow && jams_pay();

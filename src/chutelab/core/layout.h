@@ -506,6 +506,9 @@ typedef struct {
     double chosen;       /* [in] s; the usual step if `dt` is not the scene's: longer ones stay further below what hops allow */
     double easiest;      /* greatest `ease` in this step */
     double ease;         /* share of the step that hops allow which a crowd takes, less while overlaps are deep */
+    double taken, borne; /* J; the most that restitution losses have been; sum of weights times radii */
+    double eager;        /* 1; less while a crowd gets back energy that it had lost, see `note_totals`: then slow approaches
+                            may make less overlap, and overlaps are removed more slowly */
     double usual;        /* s; the step unless something cuts it short; what a step corrects is for this length */
     double length, length_before; /* s; of this step and of the one before */
     double again;        /* factor by which the impulses of the step before are the first guess for those of this one */

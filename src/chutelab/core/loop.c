@@ -23,6 +23,11 @@ World W;
 #define CHOSEN 0.7
 #define SHORTEN 0.98
 #define LENGTHEN 1.01
+/* Restitution losses of a crowd must not fall for long: then it lives on overlaps, as each fall makes one, and its removal
+   lifts what falls next. If they are below their maximum by more than what lifts all particles by OWED radii, overlaps are
+   made and removed by a share of WARY. */
+#define OWED 0.01
+#define WARY 0.25
 /* Greatest number of knots that an impact writes for a disk. */
 #define KNOTS_EACH 6
 
@@ -396,7 +401,8 @@ static double bent_step(double h) {
     return most;
 }
 
-/* Record the energy and the ledger entries of all disks at the beginning of a step. */
+/* Record the energy and the ledger entries of all disks at the beginning of a step, and set how overlaps are treated from
+   then on. */
 static void note_totals(void) {
     Total all = {.t = W.t, .unsolved = W.unsolved, .released = W.released};
     all.kinetic = W.ended[0];
@@ -427,6 +433,8 @@ static void note_totals(void) {
         for (int n = 0; n < 3; n++) all.entries[n] += d->entries[n] - ahead[n];
     }
     add_springs(all.springs);
+    W.taken = MAX(W.taken, all.entries[1]);
+    W.eager = W.g > 0 && W.taken - all.entries[1] > OWED * W.borne ? WARY : 1;
     W.totals[W.total_count++] = all;
 }
 
@@ -743,9 +751,12 @@ static int begin_part(void) {
     W.border_count = -1;
     W.t = W.disks[W.low].release;
     W.smallest = W.low;
+    W.taken = W.borne = 0;
+    W.eager = 1;
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         if (d->radius < W.disks[W.smallest].radius) W.smallest = i;
+        W.borne += d->mass * W.g * d->radius;
         d->left = d->bottom = INFINITY;
         d->right = d->top = -INFINITY;
         d->before = d->links = d->nears = d->frozen = -1;

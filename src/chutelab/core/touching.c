@@ -94,11 +94,12 @@ double ask(Contact *c, double closed, double later, double least, double h) {
     if (c->gap < -SLOP * least) {
         /* A shorter step removes less, at the same speed; else it would give more energy. */
         double share = MIN(h / W.usual, 1), beyond = c->gap + SLOP * least;
-        double part = MAX(MAX(PART, -c->gap / (DEEP * least)), -W.soft * W.step / beyond);
+        double part = W.eager * MAX(PART, -c->gap / (DEEP * least));
+        if (W.eager == 1) part = MAX(part, -W.soft * W.step / beyond);
         aim = -SLOP * least + (1 - share * MIN(part, 1)) * beyond;
         if (W.interact) {
             c->most = (c->gap + share * MOST_PARTED * least - later) / h;
-            c->gives = GIVES;
+            c->gives = W.eager * GIVES;
         }
     }
     c->need = (aim - later) / h;

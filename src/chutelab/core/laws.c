@@ -25,6 +25,9 @@ Laws L;
 #define DEEP 0.03
 #define OPENS 1e-2
 #define GIVES 3e-3
+/* Share of its potential energy above the lowest particle that overlaps of a pile may hold: by those of OPENS / 2 between
+   all layers it is lower by OPENS / 2 sqrt 3. */
+#define HELD 1e-2
 #define FALL 8e-3
 /* m/s on Earth; changes of velocity that a track of the contact engine in a crowd may leave out. */
 #define SMOOTH 1e-4
@@ -511,10 +514,23 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
    much. */
 static int is_even(double most) { return All.change <= most && All.back >= -most; }
 
+/* Potential energy of all particles at their ends above the lowest of these, J. */
+static double piled(void) {
+    double sum = 0, weights = 0, low = INFINITY;
+    for (int i = 0; i < L.particle_count; i++) {
+        if (!is_released(i)) continue;
+        double at = height(KNOT(last_of(i))), weight = L.bodies[i].mass * L.bodies[i].gravity;
+        sum += weight * at;
+        weights += weight;
+        low = MIN(low, at);
+    }
+    return weights > 0 ? sum - weights * low : 0;
+}
+
 /* Judge energy and ledger. For lone particles the unexplained energy must not change from knot to knot. Particles that
    meet give energy to each other, so for them it is the sum over all at some times, and what the solves of the contact
    engine gained. Losses must not fall, except by what the removal of overlaps gives; if many fall at one instant, by what
-   the overlaps of that instant give. */
+   the overlaps of that instant give. Nor may the sum of all fall for long, by more than the overlaps of a pile hold. */
 static void judge_books(double bound) {
     double most = bound + L.parted, least = most, rise = 0, back = 0, residual = All.residual, low = 0;
     int crowd = L.interact && L.engine == ENGINE_CONTACT, count = 0, surface = -1;
@@ -560,6 +576,8 @@ static void judge_books(double bound) {
         surface = n % L.surface_count;
     }
     if (low < -most) tell(LAW_LOSSES, low, -most)->surface = surface;
+    double lasting = most + HELD * piled();
+    if (crowd && All.gravity > 0 && L.regained > lasting) tell(LAW_LOSSES, -L.regained, -lasting);
     if (fabs(residual) > bound) tell(LAW_LEDGER, fabs(residual), bound);
     if (L.interact && L.unsolved > UNSOLVED) tell(LAW_SOLVED, L.unsolved, UNSOLVED);
 }

@@ -507,6 +507,7 @@ typedef struct {
     double easiest;      /* greatest `ease` in this step */
     double ease;         /* share of the step that hops allow which a crowd takes, less while overlaps are deep */
     double taken, borne; /* J; the most that restitution losses have been; sum of weights times radii */
+    double regained;     /* J; greatest fall of restitution losses below their maximum before */
     double eager;        /* 1; less while a crowd gets back energy that it had lost, see `note_totals`: then slow approaches
                             may make less overlap, and overlaps are removed more slowly */
     double usual;        /* s; the step unless something cuts it short; what a step corrects is for this length */
@@ -892,6 +893,7 @@ typedef struct {
     double tilt;            /* [in] rad; angle of gravity from straight down */
     double dt;              /* [in] s; step, 0 for the exact engine */
     double gained;          /* [in] J; by which solves broke their law of energy */
+    double regained;        /* [in] J; greatest fall of the restitution losses of all below their maximum before */
     double unsolved;        /* [in] radii; greatest overlap that the solve of a step left beyond what it asked for */
     double unit;            /* [in] J; unit of the entries of a crowd from a file, 0: they have all bits */
     double largest;         /* [in] m; radius of the largest particle, with its corners */

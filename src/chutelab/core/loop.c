@@ -434,7 +434,9 @@ static void note_totals(void) {
     }
     add_springs(all.springs);
     W.taken = MAX(W.taken, all.entries[1]);
-    W.eager = W.g > 0 && W.taken - all.entries[1] > OWED * W.borne ? WARY : 1;
+    double owed = W.taken - all.entries[1];
+    W.regained = MAX(W.regained, owed);
+    W.eager = W.g > 0 && owed > OWED * W.borne ? WARY : 1;
     W.totals[W.total_count++] = all;
 }
 
@@ -751,7 +753,7 @@ static int begin_part(void) {
     W.border_count = -1;
     W.t = W.disks[W.low].release;
     W.smallest = W.low;
-    W.taken = W.borne = 0;
+    W.taken = W.borne = W.regained = 0;
     W.eager = 1;
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;

@@ -288,7 +288,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
     laws.joined, laws.alike = len(machine.joints) > 0, alike(recording)
     laws.each, laws.pulley = rows.ndim > 1, machine.pulley is not None
     laws.contacts, laws.steps = recording.contacts, recording.steps
-    laws.unreal, laws.gained = unreal, recording.gained
+    laws.unreal, laws.gained, laws.regained = unreal, recording.gained, _regained(recording)
     laws.tilt, laws.dt = machine.tilt, machine.step_of(recording.engine)
     laws.mover_count, laws.swing_count = len(machine.movers), len(recording.swings)
     laws.unsolved = recording.unsolved.max(initial=0.0) if len(recording.unsolved) else 0.0
@@ -309,6 +309,12 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
         passing=passing.ravel(), barriers=rows.reshape(-1), books=books,
     )  # fmt: skip
+
+
+def _regained(recording: Record) -> float:
+    """Return the greatest fall of all restitution losses below their maximum before, J."""
+    losses = recording.totals["entries"][:, 1] if len(recording.totals) else np.zeros(1)
+    return float((np.maximum.accumulate(losses) - losses).max())
 
 
 _ENGINES = ("exact", "contact", "pymunk")

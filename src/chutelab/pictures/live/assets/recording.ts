@@ -280,6 +280,8 @@ class Recording {
   books: number[][] | null = null;
   /** Energy by which the engine's solver broke its law, J. */
   gained = 0;
+  /** Greatest fall of all restitution losses below their maximum before, J. */
+  regained = 0;
   unsolved = 0;
   /** Impacts and steps so far. */
   contacts = 0;
@@ -307,16 +309,17 @@ class Recording {
   }
 
   add({
-    knots, tips, events, swings, now, state, books = null, gained = 0, unsolved = 0,
+    knots, tips, events, swings, now, state, books = null, gained = 0, regained = 0, unsolved = 0,
     contacts = 0, steps = 0, loads, triggered = [], pushed = 0, given = 0, totals,
   }: {
     knots: Float64Array, tips: Float64Array, events: Event[], swings: number[], now: number,
     state: string,
-    books?: number[][] | null, gained?: number, unsolved?: number, contacts?: number,
-    steps?: number, loads?: { from: number, rows: Float64Array }, triggered?: number[],
-    pushed?: number, given?: number, totals?: Float64Array,
+    books?: number[][] | null, gained?: number, regained?: number, unsolved?: number,
+    contacts?: number, steps?: number, loads?: { from: number, rows: Float64Array },
+    triggered?: number[], pushed?: number, given?: number, totals?: Float64Array,
   }) {
     this.gained = gained;
+    this.regained = regained;
     this.unsolved = unsolved;
     this.contacts = contacts;
     this.steps = steps;

@@ -40,12 +40,12 @@ def test_a_package_that_is_too_old_is_named(tmp_path, monkeypatch, version, fits
 
 def test_packages_are_found_as_python_finds_them(tmp_path, monkeypatch):
     installed(tmp_path, "Some.old_Name", "1.5rc2")
-    (tmp_path / "other_name-2.5-py3.11.egg-info").mkdir()
     monkeypatch.syspath_prepend(tmp_path)
+    every = [one for one in metadata.distributions() if one.metadata["Name"]]
+    (tmp_path / "other_name-2.5-py3.11.egg-info").mkdir()
     found = {name: version for name, (version, _) in errors.installed().items()}
     assert found["some-old-name"] == "1.5rc2"
     assert found.pop("other-name") == "2.5"  # without METADATA Python has no version of it
-    every = [one for one in metadata.distributions() if one.metadata["Name"]]
     names = [re.sub(r"[-_.]+", "-", one.metadata["Name"]).lower() for one in every]
     assert found == dict(zip(names[::-1], [one.version for one in every][::-1], strict=True))
 

@@ -514,10 +514,12 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
    much. */
 static int is_even(double most) { return All.change <= most && All.back >= -most; }
 
-/* Potential energy of all particles at their ends above the lowest of these, J. */
+/* Potential energy of all particles at their ends above the lowest of these, J; without bound if nothing holds some of
+   them apart: what the incoming belt carries by adhesion may be deep in others as it leaves. */
 static double piled(void) {
     double sum = 0, weights = 0, low = INFINITY;
     for (int i = 0; i < L.particle_count; i++) {
+        if (L.bodies[i].group) return INFINITY;
         if (!is_released(i)) continue;
         double at = height(KNOT(last_of(i))), weight = L.bodies[i].mass * L.bodies[i].gravity;
         sum += weight * at;

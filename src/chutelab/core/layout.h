@@ -506,8 +506,9 @@ typedef struct {
     double chosen;       /* [in] s; the usual step if `dt` is not the scene's: longer ones stay further below what hops allow */
     double easiest;      /* greatest `ease` in this step */
     double ease;         /* share of the step that hops allow which a crowd takes, less while overlaps are deep */
-    double taken, borne; /* J; the most that restitution losses have been; sum of weights times radii */
-    double regained;     /* J; greatest fall of restitution losses below their maximum before */
+    double taken[2];     /* J; the most that restitution and friction losses of a crowd have been */
+    double borne;        /* J; sum of weights times radii */
+    double regained;     /* J; greatest fall of both together below these */
     double eager;        /* 1; less while a crowd gets back energy that it had lost, see `note_totals`: then slow approaches
                             may make less overlap, and overlaps are removed more slowly */
     double usual;        /* s; the step unless something cuts it short; what a step corrects is for this length */
@@ -893,7 +894,7 @@ typedef struct {
     double tilt;            /* [in] rad; angle of gravity from straight down */
     double dt;              /* [in] s; step, 0 for the exact engine */
     double gained;          /* [in] J; by which solves broke their law of energy */
-    double regained;        /* [in] J; greatest fall of the restitution losses of all below their maximum before */
+    double regained;        /* [in] J; greatest fall of the losses of all below their maxima before, both together */
     double unsolved;        /* [in] radii; greatest overlap that the solve of a step left beyond what it asked for */
     double unit;            /* [in] J; unit of the entries of a crowd from a file, 0: they have all bits */
     double largest;         /* [in] m; radius of the largest particle, with its corners */

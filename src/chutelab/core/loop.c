@@ -23,8 +23,8 @@ World W;
 #define CHOSEN 0.7
 #define SHORTEN 0.98
 #define LENGTHEN 1.01
-/* Restitution losses of a crowd must not fall for long: then it lives on overlaps, as each fall makes one, and its removal
-   lifts what falls next. If they are below their maximum by more than what lifts all particles by OWED radii, overlaps are
+/* Losses of a crowd must not fall for long: then it lives on overlaps, as each fall makes one, and its removal lifts what
+   falls next. If they are below their maxima by more than what lifts all particles by OWED radii, overlaps are
    made and removed by a share of WARY. */
 #define OWED 0.01
 #define WARY 0.25
@@ -433,8 +433,11 @@ static void note_totals(void) {
         for (int n = 0; n < 3; n++) all.entries[n] += d->entries[n] - ahead[n];
     }
     add_springs(all.springs);
-    W.taken = MAX(W.taken, all.entries[1]);
-    double owed = W.taken - all.entries[1];
+    double owed = 0;
+    for (int n = 0; n < 2; n++) {
+        W.taken[n] = MAX(W.taken[n], all.entries[1 + n]);
+        owed += W.taken[n] - all.entries[1 + n];
+    }
     W.regained = MAX(W.regained, owed);
     W.eager = W.g > 0 && owed > OWED * W.borne ? WARY : 1;
     W.totals[W.total_count++] = all;
@@ -753,7 +756,7 @@ static int begin_part(void) {
     W.border_count = -1;
     W.t = W.disks[W.low].release;
     W.smallest = W.low;
-    W.taken = W.borne = W.regained = 0;
+    W.taken[0] = W.taken[1] = W.borne = W.regained = 0;
     W.eager = 1;
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;

@@ -312,9 +312,9 @@ def _lay_out(module: core.Module, recording: Record) -> None:
 
 
 def _regained(recording: Record) -> float:
-    """Return the greatest fall of all restitution losses below their maximum before, J."""
-    losses = recording.totals["entries"][:, 1] if len(recording.totals) else np.zeros(1)
-    return float((np.maximum.accumulate(losses) - losses).max())
+    """Return the greatest fall of all losses below their maxima before, both together, J."""
+    losses = recording.totals["entries"][:, 1:] if len(recording.totals) else np.zeros((1, 2))
+    return float((np.maximum.accumulate(losses) - losses).sum(axis=1).max())
 
 
 _ENGINES = ("exact", "contact", "pymunk")

@@ -280,7 +280,7 @@ class Recording {
   books: number[][] | null = null;
   /** Energy by which the engine's solver broke its law, J. */
   gained = 0;
-  /** Greatest fall of all restitution losses below their maximum before, J. */
+  /** Greatest fall of all losses below their maxima before, both together, J. */
   regained = 0;
   unsolved = 0;
   /** Impacts and steps so far. */

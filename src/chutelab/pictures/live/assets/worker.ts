@@ -10,7 +10,7 @@
 //      "stalled" or "failed". `triggered` are the times of what waits for a touch, s; `totals` the
 //      sums over all particles at each step, for machines with joints; `pushed` the work of all
 //      pushes and `given` that of all surfaces, J; `gained` the energy by which solves have broken
-//      their law so far, J; `regained` the greatest fall of restitution losses, J; `unsolved` the
+//      their law so far, J; `regained` the greatest fall of losses, J; `unsolved` the
 //      largest overlap that a solve left, in radii. `books` and `reasons` come at the end.
 //      {type: "laws", id, breaches}: the answer to "judge".
 //      {type: "broken"}: the core could not be loaded.

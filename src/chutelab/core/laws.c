@@ -25,8 +25,7 @@ Laws L;
 #define DEEP 0.03
 #define OPENS 1e-2
 #define GIVES 3e-3
-/* Share of its potential energy above the lowest particle that overlaps of a pile may hold: by those of OPENS / 2 between
-   all layers it is lower by OPENS / 2 sqrt 3. */
+/* Share of the energy in play that losses of a pile may give back in a run. */
 #define HELD 1e-2
 #define FALL 8e-3
 /* m/s on Earth; changes of velocity that a track of the contact engine in a crowd may leave out. */
@@ -514,25 +513,20 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
    much. */
 static int is_even(double most) { return All.change <= most && All.back >= -most; }
 
-/* Potential energy of all particles at their ends above the lowest of these, J; without bound if nothing holds some of
-   them apart: what the incoming belt carries by adhesion may be deep in others as it leaves. */
-static double piled(void) {
-    double sum = 0, weights = 0, low = INFINITY;
-    for (int i = 0; i < L.particle_count; i++) {
-        if (L.bodies[i].group) return INFINITY;
-        if (!is_released(i)) continue;
-        double at = height(KNOT(last_of(i))), weight = L.bodies[i].mass * L.bodies[i].gravity;
-        sum += weight * at;
-        weights += weight;
-        low = MIN(low, at);
-    }
-    return weights > 0 ? sum - weights * low : 0;
+/* Whether particles lie on each other as a pile does, with all energy that losses give back from overlaps: they are round,
+   no surface moves, no joint pulls, and the incoming belt carries none by adhesion, which may be deep in others as it
+   leaves. */
+static int is_pile(void) {
+    int plain = L.interact && L.engine == ENGINE_CONTACT && All.gravity > 0;
+    plain &= !(L.outline_count || L.mover_count || L.joined);
+    for (int i = 0; i < L.particle_count && plain; i++) plain = !L.bodies[i].group;
+    return plain;
 }
 
 /* Judge energy and ledger. For lone particles the unexplained energy must not change from knot to knot. Particles that
    meet give energy to each other, so for them it is the sum over all at some times, and what the solves of the contact
    engine gained. Losses must not fall, except by what the removal of overlaps gives; if many fall at one instant, by what
-   the overlaps of that instant give. Nor may the sum of all fall for long, by more than the overlaps of a pile hold. */
+   the overlaps of that instant give. Nor may the sums of a pile fall for long. */
 static void judge_books(double bound) {
     double most = bound + L.parted, least = most, rise = 0, back = 0, residual = All.residual, low = 0;
     int crowd = L.interact && L.engine == ENGINE_CONTACT, count = 0, surface = -1;
@@ -578,8 +572,8 @@ static void judge_books(double bound) {
         surface = n % L.surface_count;
     }
     if (low < -most) tell(LAW_LOSSES, low, -most)->surface = surface;
-    double lasting = most + HELD * piled();
-    if (crowd && All.gravity > 0 && L.regained > lasting) tell(LAW_LOSSES, -L.regained, -lasting);
+    double lasting = most + HELD * L.energy;
+    if (is_pile() && L.regained > lasting) tell(LAW_LOSSES, -L.regained, -lasting);
     if (fabs(residual) > bound) tell(LAW_LEDGER, fabs(residual), bound);
     if (L.interact && L.unsolved > UNSOLVED) tell(LAW_SOLVED, L.unsolved, UNSOLVED);
 }

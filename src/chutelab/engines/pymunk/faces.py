@@ -43,6 +43,12 @@ def direction(begin: Place, end: Place) -> Vec2d:
     return Vec2d(x / far, y / far)
 
 
+def length(v: Place) -> float:
+    """Return the length of a vector."""
+    x, y = v
+    return sqrt(x * x + y * y)
+
+
 class Path(Protocol):
     """Motion of one particle between contacts."""
 
@@ -50,10 +56,10 @@ class Path(Protocol):
     def most(self) -> float:
         """The largest acceleration (m/s²) in any direction."""
 
-    def at(self, after: float) -> tuple[Place, Vec2d]:
+    def at(self, after: float) -> tuple[Place, Place]:
         """Return place (m) and velocity (m/s) after a time (s)."""
 
-    def pull(self, normal: Vec2d, /) -> float:
+    def pull(self, normal: Place, /) -> float:
         """Return the least acceleration (m/s²) along a normal."""
 
 
@@ -127,7 +133,7 @@ class Face:
         """Return the curvature (1/m) of a centre's path inside an arc, 0 elsewhere."""
         return 0.0
 
-    def free(self, path: Path, x: Place, v: Vec2d, gap: float, rate: float, pull: float) -> float:
+    def free(self, path: Path, x: Place, v: Place, gap: float, rate: float, pull: float) -> float:
         """Return a time (s) within which a disk on a path cannot meet the surface.
 
         A convex one lies behind the plane through its nearest point: the gap stays above
@@ -203,7 +209,7 @@ class Bend(Face):
         room = self.shape.radius - self.radius
         return 1.0 / room if room > 0.0 and (x - self.center).length < self.shape.radius else 0.0
 
-    def free(self, path: Path, x: Place, v: Vec2d, gap: float, rate: float, pull: float) -> float:
+    def free(self, path: Path, x: Place, v: Place, gap: float, rate: float, pull: float) -> float:
         """Return a time (s) within which it cannot be met; for the outside see `Face.free`.
 
         Beside an arc until a line through the centre and an end. Inside, c away from the centre,
@@ -214,16 +220,16 @@ class Bend(Face):
             lines = (Vec2d.from_polar(1.0, self.begin + turn) for turn in (0.0, self.extent))
             sides = [line.perpendicular() for line in lines]
             sides = [side if away.dot(side) >= 0.0 else -side for side in sides]
-            ahead = min(falls(away.dot(n), v.dot(n), path.pull(n)) for n in sides)
+            ahead = min(falls(away.dot(n), n.dot(v), path.pull(n)) for n in sides)
             # Go past the line, so that the side is certain.
-            pace = max(v.length, sqrt(path.most * self.radius))
+            pace = max(length(v), sqrt(path.most * self.radius))
             # A particle at rest without gravity never gets there.
             return ahead + HAIR * self.radius / pace if pace else inf
         if not (hollow := self.hollow(x)):
             return falls(gap, rate, pull)
         rho, c = 1.0 / hollow, away.length
-        horizon = rho / (v.length + sqrt(path.most * rho))
-        bend = 2.0 * ((v.length + path.most * horizon) ** 2 + rho * path.most)
+        horizon = rho / (length(v) + sqrt(path.most * rho))
+        bend = 2.0 * ((length(v) + path.most * horizon) ** 2 + rho * path.most)
         return min(falls(gap * (rho + c), -2.0 * away.dot(v), -bend), horizon)
 
 
@@ -234,17 +240,18 @@ class Flight(NamedTuple):
     v: Vec2d
     g: Vec2d
 
-    def at(self, after: float) -> tuple[Place, Vec2d]:
+    def at(self, after: float) -> tuple[Place, Place]:
         """Return place (m) and velocity (m/s) after a time (s)."""
         # In plain numbers, as operators of Vec2d take ten times as long.
         (x, y), (vx, vy), (gx, gy) = self
         half = 0.5 * after
         place = x + after * (vx + half * gx), y + after * (vy + half * gy)
-        return place, Vec2d(vx + after * gx, vy + after * gy)
+        return place, (vx + after * gx, vy + after * gy)
 
-    def pull(self, normal: Vec2d) -> float:
+    def pull(self, normal: Place) -> float:
         """Return the acceleration (m/s²) along a normal."""
-        return self.g.dot(normal)
+        (x, y), (u, v) = self.g, normal
+        return x * u + y * v
 
     @property
     def most(self) -> float:

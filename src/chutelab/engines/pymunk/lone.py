@@ -305,10 +305,10 @@ class Lone:
         if span > 0.0:
             # Exact, so one step is enough.
             self.restitution, self.circle.filter = {}, NOTHING
-            self._step(self.x, path.at(0.5 * span)[1], self.omega, span, self.pull)
+            self._step(self.x, Vec2d(*path.at(0.5 * span)[1]), self.omega, span, self.pull)
             self.circle.filter = EVERYTHING
             self.t += span
-            self.x, self.v = self.body.position, path.at(span)[1]
+            self.x, self.v = self.body.position, Vec2d(*path.at(span)[1])
         if reason:
             self._end(reason, Kind.EXIT if reason == "exit" else None)
         else:

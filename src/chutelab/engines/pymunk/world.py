@@ -14,7 +14,7 @@ import pymunk
 from numpy.typing import ArrayLike
 from pymunk import Vec2d
 
-from chutelab.engines.pymunk.faces import HAIR, NONE, Bend, Face, Path, Place, nearest
+from chutelab.engines.pymunk.faces import HAIR, NONE, Bend, Face, Path, Place, length, nearest
 from chutelab.machine import Arcs, Machine, Segments
 from chutelab.results.loads import Bins
 from chutelab.results.recorder import Recorder
@@ -255,7 +255,9 @@ class World:
         while True:
             x, v = path.at(t)
             gap, normal = near or face.gap(x)
-            near, rate, speed = None, v.dot(normal), v.length
+            # In plain numbers, as in `Flight`.
+            (vx, vy), (nx, ny) = v, normal
+            near, rate, speed = None, vx * nx + vy * ny, length(v)
             slow = self.tiny * (self.pace + speed)
             if leaving:
                 if gap < -hair and t > 0.0:
@@ -287,7 +289,7 @@ class World:
             x, v = path.at(t)
             if face.gap(x)[0] >= -self.hair and face.side(x) >= 0.0:
                 return t
-            t += 0.1 * self.radius / max(v.length, sqrt(path.most * self.radius), self.tiny)
+            t += 0.1 * self.radius / max(length(v), sqrt(path.most * self.radius), self.tiny)
         return span
 
     def meets_gate(self, path: Path, face: Face, span: float, t: float) -> float:
@@ -348,7 +350,7 @@ class Carriage:
         c, s = cos(angle), sin(angle)
         return Vec2d(self.rho * s, self.rho * c), Vec2d(self.speed * c, -self.speed * s)
 
-    def pull(self, _normal: Vec2d) -> float:
+    def pull(self, _normal: Place) -> float:
         """Return the least acceleration (m/s²) along any normal."""
         return -self.most
 

@@ -219,8 +219,8 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
         lasts |= c->i == i && c->j == j && c->impulse[0] > 0;
     }
     double within = (lasts ? TOUCH : TOUCHING) * least, span = 2 * SOON * W.step, most = 0;
-    /* A particle with joints is struck at the beginning of a step, if its impact would be just after it. */
-    if (is_tied(i) || is_tied(j)) most = fastest_of(i, j, t, span);
+    /* With joints, an impact just after the beginning of a step is resolved at the beginning. */
+    if (W.joint_count && t <= W.t) most = fastest_of(i, j, t, span);
     if (most < INFINITY) within = MAX(within, most * span);
     const Touch *places = places_at(i, j, t, within, &count);
     for (int n = 0; n < count; n++) {

@@ -592,8 +592,9 @@ static double first_of_tied(void) {
 }
 
 /* An impact of a particle with joints ends the step: the pull of the joints is solved anew for the shorter step, and the
-   impact is resolved at the beginning of the next one, before all else. Return the disk if it had too many impacts, else
-   -1. */
+   impact is resolved at the beginning of the next one, before all else. So are impacts of others just after that: they
+   may pass on to such particles at once, and the first halves of impulses can only be taken back before. Return the disk
+   if it had too many impacts, else -1. */
 static int meet_tied(int i, int j, double t) {
     double soon = SOON * W.step;
     if (t > W.t + soon && t > W.step_end - soon) expect(i, INFINITY, ALARM);
@@ -647,8 +648,7 @@ static int go_through(void) {
             continue;
         }
         W.now = t;
-        /* An impact at the beginning of a step may pass on to particles with joints. */
-        if (j != ALARM && (is_tied(i) || is_tied(j) || (W.joint_count && t <= W.t))) {
+        if (j != ALARM && (is_tied(i) || is_tied(j) || (W.joint_count && t <= W.t + SOON * W.step))) {
             if ((W.stalled = meet_tied(i, j, t)) < 0) continue;
             return STALLED;
         }

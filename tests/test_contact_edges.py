@@ -132,6 +132,30 @@ def test_a_row_on_a_belt_that_grips_without_bound_stalls_it(count, angle, wall, 
     assert judge(recording) == ()
 
 
+def test_a_column_that_locks_between_two_belts_stalls_them():
+    """It leans on a belt that goes down, and stands on one that pulls its foot below that belt.
+
+    Its disks do not turn, and the tangent of its lean is less than the floor's friction: no load
+    makes it slip, so rigid bodies have a solution only if belts stall. There are at most 200 blows
+    of m v² on each disk.
+    """
+    lean, speed, count = radians(5.0), 5.0, 80
+    surfaces = [
+        face("floor", (-9.0, 0.0), (3.0, 0.0), speed=-speed, friction=0.25, restitution=0.0),
+        face("belt", (0.0, 4.0), (0.0, 0.0), speed=speed, friction=5.0, restitution=0.0),
+    ]
+    machine = scene_of(particle={"radius": R, "spin": False}, surface=surfaces,
+                       stream={"restitution": 0.0, "friction": 0.9, "at": [-2.0, 1.0]},
+                       run={"until": 0.1, "dt": 1e-3})  # fmt: skip
+    up, above = np.array([-sin(lean), cos(lean)]), 2.0 * R * np.arange(count)
+    row = 1.0001 * R + np.outer(above, up) + [above[-1] * sin(lean), 0.0]
+    recording = run(thrown(machine, row, -2.0 * up))
+    assert judge(recording) == ()
+    assert recording.steps < 2.0 * 0.1 / 1e-3, "impacts without end would cut steps short"
+    paid = recording.by_surface[:, 0].sum()
+    assert paid < 200.0 * count * machine.particle.mass * speed**2
+
+
 @pytest.mark.parametrize(
     ("angle", "friction", "wall"), [(30.0, 0.5, 0.8), (60.0, 0.5, 0.1), (30.0, 1e6, 0.1)]
 )

@@ -41,7 +41,7 @@ void describe(Contact *c, int i, int j) {
     double spin_mass = turn;
     c->i = i;
     c->j = j;
-    c->two = c->hung = c->cornered = c->halved = 0;
+    c->two = c->hung = c->cornered = c->halved = c->stalls = 0;
     c->owner = W.owner_count;
     c->moved[0] = c->moved[1] = c->moved[2] = 0;
     c->mass[1] = mass + r * r * turn;
@@ -97,6 +97,16 @@ void describe(Contact *c, int i, int j) {
     c->parts = 0;
     c->friction = pair->friction;
     c->arm = pair->rolling * reach;
+}
+
+/* Stop the drive of a contact if it stalls under that disk in this step, see `stall`: each impact would start it again. */
+void stall_too(Contact *c) {
+    for (int link = W.disks[c->i].links; link >= 0 && c->j < 0; link = W.links[link]) {
+        const Contact *last = W.contacts + link / 2;
+        if (!last->stalls || last->i != c->i || !goes_on(last->j, c->j)) continue;
+        c->other[1] = c->moved[1];
+        c->other[2] = c->moved[2];
+    }
 }
 
 /* Relative velocities at a contact: normal, slip, spin; now, or before the impulses of the step (`earlier`). */

@@ -155,6 +155,7 @@ static inline int goes_on(int j, int other) {
 }
 /* The same for surfaces that a disk touches at the same place: pieces that lie on each other, or a point that two share. */
 int is_one(const Disk *d, int k, int other);
+void stall_too(Contact *c);
 int is_held(const Disk *d, int k);
 /* Whether a disk that is on a piece at the beginning of a step cannot be inside an arc at its end. */
 static inline int is_flat(const Surface *s) {

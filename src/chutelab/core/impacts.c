@@ -503,6 +503,7 @@ static void strike(int i, int j, double t) {
     double u[3];
     if (j < 0 && is_hung(-1 - j)) strike_hinge(W.surfaces[-1 - j].mover, t);
     describe(&c, i, j);
+    stall_too(&c);
     c.drift = 0;
     if (is_tied(i) || is_tied(j)) strike_joints(i, j);
     was_moved(i);

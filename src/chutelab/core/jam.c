@@ -38,6 +38,7 @@ static int add_touching(int i, int j, double radius, int *count) {
         return found > 0;
     }
     describe(c, i, j);
+    stall_too(c);
     if (c->gap > TOUCH * radius) return 0;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = c->drift = 0;
     *count += 1;

@@ -299,7 +299,8 @@ typedef struct {
     double own[2], others[2]; /* m; with corners: levers of a normal and of a tangential impulse, on i and on j */
     double spot[2];         /* m; ... and the place from the centre of i, in the frame of i */
     double looked[7];       /* m, rad; when the place was looked up: the gap, and x, y and `turned` of i and of j */
-    int places, pad;        /* number of places at which the two touched then */
+    int places;             /* number of places at which the two touched then */
+    int stalls;             /* its surface has stalled in this step, see solver.c */
     double mean[2];         /* N; running mean of its force on i, see sleep.c; NaN before the first step */
 } Contact;
 

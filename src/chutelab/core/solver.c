@@ -25,6 +25,8 @@
 /* If the last round ends with more than this share of the change at the end of the first, the sweeps press harder each time,
    without end. */
 #define CRAWLS 0.5
+/* But not where surfaces drive and gaps miss what they ask for by more than so many times what is good enough. */
+#define GROSS 10
 /* m/s at 1 g; change at which sweeps over few contacts end if there are corners, joints or hinges. */
 #define FINE_FEW 1e-11
 /* The same over many contacts, as a share of that of disks: with less a pile of boxes does not come to rest. */
@@ -54,7 +56,7 @@ static int stall(Contact *list, int count, double least, double enough) {
         r->spin += c->other[2] - c->moved[2];
         c->other[1] = c->moved[1];
         c->other[2] = c->moved[2];
-        stalled = 1;
+        c->stalls = stalled = 1;
     }
     return stalled;
 }
@@ -74,13 +76,14 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 
    A round is `sweeps` sweeps, until changes are at most `accurate`, m/s. It is good enough as well if gaps miss what they ask
    for by at most `enough`, m/s; contacts that need finer changes than a crowd's get all rounds for them. Small changes that
-   leave gaps open are swept on ten times as finely. After the last round it is good enough if the changes still shrink.
+   leave gaps open are swept on ten times as finely. After the last round it is good enough if the changes still shrink, but
+   with a drive only if gaps miss no more than GROSS times `enough`.
 
    Else, and where sweeps diverge, the rigid bodies may have no solution: they are driven into a wedge that locks itself. Then
    friction is lowered, from contacts that change most, until there is one. If a drive presses, it presses harder in each
    sweep: closed gaps alone prove nothing there, the changes have to end, too. A disk that cannot turn, held by friction that
-   locks, would slip through if friction were lowered: it stalls the drive for this step. So does a disk that is blocked on a
-   belt with practically unbounded friction.
+   locks, would slip through if friction were lowered: it stalls the drive for this step, and for all impacts in it. So does a
+   disk that is blocked on a belt with practically unbounded friction.
 
    The impulses of the step before are taken as far as they lower the cost, see `lessen`: where a contact has opened, those of
    its neighbours would throw disks out. But not in a crowd with corners: the share is that of the whole island, so for a blow
@@ -113,7 +116,8 @@ int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, 
         if (left == 0) break;
         int stalled = driven && change < INFINITY && stall(list, count, INFINITY, enough);
         if (!stalled) {
-            if (ended && (more < 2 || fine)) break;
+            int gross = driven && change < INFINITY && left_open() > GROSS * enough;
+            if (ended && (fine || (more < 2 && !gross))) break;
             if (ended) accurate *= 0.1;
             if (change < INFINITY) worst = pressing ? MAX(left_open(), change) : left_open();
             if (worst <= enough && !(fine && more > 1)) break;
@@ -121,7 +125,7 @@ int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, 
                 if (more-- == rounds) first = change;
                 continue;
             }
-            if (more == 1 && change < CRAWLS * first) break;
+            if (more == 1 && change < CRAWLS * first && !gross) break;
             worst = 0;
             for (int n = 0; n < count; n++) worst = MAX(worst, W.rows[n].change);
             stalled = driven && stall(list, count, FOLLOWS * worst, INFINITY);

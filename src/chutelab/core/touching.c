@@ -7,7 +7,9 @@
    no faster than 2 g dt, at least the share PART, and all of it from DEEP on, but no more than MOST_PARTED: removal does
    work, and where a wedged chain opens the speeds of its contacts add up. (With a smaller bound such a chain takes many
    times the sweeps.) The contact gives way like a spring of stiffness PART / GIVES M / step^2, with M the heaviest mass of the
-   island: rigid particles wedged between walls cannot part, and their impulses would grow in each sweep. */
+   island: rigid particles wedged between walls cannot part, and their impulses would grow in each sweep. While a crowd gets
+   back energy that it had lost (`eager` < 1, see layout.h), both shares and GIVES are multiplied by `eager`, and no more is
+   removed for the sake of 2 g dt. */
 #define SLOP 5e-4
 #define PART 0.1
 #define DEEP 0.03
@@ -126,7 +128,7 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     int far = c->gap > TOUCH * least, cornered = place || still;
     if (far && (W.interact || j >= 0 || !d->supports)) return 1;
     later = c->free_gap = still ? c->free_gap : place ? place->later : gap_later(c, h, 0);
-    c->bend = 0;
+    c->bend = c->stalls = 0;
     if (far && later > 0) return 1;
     relative(c, 0, u);
     /* An impact has just lifted it off: it is in flight. */

@@ -206,6 +206,22 @@ def test_removed_overlaps_may_give_a_crowd_energy_up_to_their_bound_in_each_step
             assert verdict.holds == holds
 
 
+def test_a_crowd_may_get_back_as_much_as_in_every_run():
+    """With gravity: 5 % of a radius for each particle's weight, and 1 % of the energy in play."""
+    recording = Recording.of(contact.run(crowds.crowd(37, count=60)[1]))
+    lost = recording.totals["entries"][:, 1:].sum(axis=1)  # by the ledger, what energy fell by
+    m, turned = recording.machine.particle, Evidence(recording).bounds.energy
+    weight = recording.gravity * np.broadcast_to(m.mass, recording.count).sum()
+    most = 0.05 * weight * np.max(m.radius) + 0.01 * turned
+    k = len(lost) // 2
+    for share, holds in ((0.99, True), (1.01, False)):
+        more = recording.totals.copy()
+        more["kinetic"][k] += share * most - (lost[:k].max() - lost[k])
+        verdict = laws.energy(Evidence(replace(recording, totals=more)))
+        assert verdict.figure == pytest.approx(share * most / turned, rel=1e-6)
+        assert verdict.holds == holds
+
+
 def test_a_turn_more_breaks_angular_momentum_only():
     change = adder("omega", -1, 400.0)
     assert not laws.spin(crowd(knots=change)).holds

@@ -25,7 +25,7 @@ Laws L;
 #define DEEP 0.03
 #define OPENS 1e-2
 #define GIVES 3e-3
-/* Share of the energy in play that losses of a pile may give back in a run. */
+/* Share of the energy in play that losses of a crowd may give back in a run. */
 #define HELD 1e-2
 #define FALL 8e-3
 /* m/s on Earth; changes of velocity that a track of the contact engine in a crowd may leave out. */
@@ -79,13 +79,13 @@ static double given_back(const double *now) {
 /* Knots that break a law, found in the order of particles. */
 typedef struct { int particles, particle, latest, knot; } Group;
 
-/* Sums over all particles, and the largest and least values of one. `size` is of pieces: the largest coordinate and
-   length of segments, coordinate and radius of arcs; `belts` their largest speed. `whirl` is the largest speed of a
-   corner by rotation, m/s; `reach` the largest coordinate or length of anything, m. For particles that do not meet also
-   the energy that is unexplained at their ends, J, its largest change between two knots, and the least value of
-   `given_back`. */
+/* Sums over all particles, and the largest and least values of one. `lightness` sums 1 / mass. `size` is of pieces: the
+   largest coordinate and length of segments, coordinate and radius of arcs; `belts` their largest speed. `whirl` is the
+   largest speed of a corner by rotation, m/s; `reach` the largest coordinate or length of anything, m. For particles that
+   do not meet also the energy that is unexplained at their ends, J, its largest change between two knots, and the least
+   value of `given_back`. */
 static struct {
-    double mass, weight, heaviest, smallest, gravity, size[4], belts;
+    double mass, lightness, weight, heaviest, smallest, gravity, size[4], belts;
     double t, knot_t, place, reach, fastest, whirl, lifted, entries[3], residual, change, back;
     Group bad;
     int unreal;
@@ -138,6 +138,7 @@ static void scan_machine(void) {
     for (int i = 0; i < L.particle_count; i++) {
         const Body *body = L.bodies + i;
         All.mass += body->mass;
+        All.lightness += 1 / body->mass;
         All.weight += body->mass * body->gravity;
         All.heaviest = MAX(All.heaviest, body->mass);
         All.gravity = MAX(All.gravity, body->gravity);
@@ -280,16 +281,20 @@ static double energy_share(void) {
     return share + (L.energy ? touched * All.heaviest * All.gravity * L.late / L.energy : 0);
 }
 
-/* Energy that the removal of overlaps may give, J: at most what lifts all particles by the greatest overlap. For lone
-   particles a knot in contact has the mean velocity of a step, which differs from its ledger by half a step's
-   acceleration: that of gravity along the path, and that of an arc across it. */
+/* Energy that the removal of overlaps may give, J: at most what lifts all particles by the greatest overlap. On a surface
+   that accelerates by a they also hop by a h^2 / 8 in a step h, with a h^2 at most FALL r. For lone particles a knot in
+   contact has the mean velocity of a step, which differs from its ledger by half a step's acceleration: that of gravity
+   along the path, and that of an arc across it. Two that a cohesion F holds hop by it with the energy (F h)^2 / 4 m, half of
+   m being the mass of their relative motion; each has three such contacts. */
 static double energy_parted(void) {
     if (L.engine == ENGINE_EXACT) return 0;
     if (!L.interact) {
         double across = 0.5 * square(0.5 * L.bent * L.dt);
         return All.heaviest * (L.speed * (All.gravity + L.haste) * L.dt + across);
     }
-    double allowed = All.mass * All.gravity * L.late;
+    double hop = L.alike ? 0 : MIN(FALL * All.smallest, L.haste * square(L.dt)) / 8;
+    double allowed = All.mass * (All.gravity * L.late + L.haste * hop);
+    if (!L.alike) allowed += 0.75 * square(L.cohesion * L.dt) * All.lightness;
     if (L.alike) {
         /* The pymunk engine leaves out contacts that move a track by less than LEAVES_OUT of the radius. A cubic with an
            end velocity that is off by w is off by 4/27 w tau in place, where tau is a step or more. */
@@ -320,6 +325,7 @@ static void find_bounds(void) {
     if (!L.interact) L.energy += All.weight * All.reach;
     L.energy_bound = energy_share();
     L.parted = energy_parted();
+    L.held = L.parted + HELD * L.energy;
     /* m v w: in a crowd a track may leave out a change w of the velocity. */
     double swift = All.gravity > 0 ? sqrt(All.gravity / EARTH) : 1;
     int crowd = L.interact && L.engine == ENGINE_CONTACT;
@@ -517,7 +523,7 @@ static int is_even(double most) { return All.change <= most && All.back >= -most
    no surface moves, no joint pulls, and the incoming belt carries none by adhesion, which may be deep in others as it
    leaves. */
 static int is_pile(void) {
-    int plain = L.interact && L.engine == ENGINE_CONTACT && All.gravity > 0;
+    int plain = L.interact && L.engine == ENGINE_CONTACT;
     plain &= !(L.outline_count || L.mover_count || L.joined);
     for (int i = 0; i < L.particle_count && plain; i++) plain = !L.bodies[i].group;
     return plain;
@@ -572,8 +578,7 @@ static void judge_books(double bound) {
         surface = n % L.surface_count;
     }
     if (low < -most) tell(LAW_LOSSES, low, -most)->surface = surface;
-    double lasting = most + HELD * L.energy;
-    if (is_pile() && L.regained > lasting) tell(LAW_LOSSES, -L.regained, -lasting);
+    if (is_pile() && L.regained > bound + L.held) tell(LAW_LOSSES, -L.regained, -bound - L.held);
     if (fabs(residual) > bound) tell(LAW_LEDGER, fabs(residual), bound);
     if (L.interact && L.unsolved > UNSOLVED) tell(LAW_SOLVED, L.unsolved, UNSOLVED);
 }

@@ -899,6 +899,7 @@ typedef struct {
     double unsolved;        /* [in] radii; greatest overlap that the solve of a step left beyond what it asked for */
     double unit;            /* [in] J; unit of the entries of a crowd from a file, 0: they have all bits */
     double largest;         /* [in] m; radius of the largest particle, with its corners */
+    double cohesion;        /* [in] N; greatest force that holds two together */
     double loose;           /* [in] how much larger ON_ARCS is for this run */
     int judged;             /* particles that have been judged while others still run */
     /* [out] */
@@ -914,6 +915,7 @@ typedef struct {
     double energy;          /* J; in play, see `energy_share` */
     double energy_bound;    /* rounding of the energy, as a share of it */
     double parted;          /* J; that the removal of overlaps may give */
+    double held;            /* J; by which all losses of a crowd may be below their maxima before */
     double untold;          /* J; that a crowd's tracks may leave out between two knots */
 } Laws;
 

@@ -294,6 +294,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
     laws.unsolved = recording.unsolved.max(initial=0.0) if len(recording.unsolved) else 0.0
     laws.largest, laws.loose, laws.unit = machine.particle.largest, machine.loose, recording.unit
     laws.outline_count, laws.kind_count = len(outlines), len(passing)
+    laws.cohesion = machine.cohesion.max(initial=0.0)
     module.work("lay_out_laws")
     if machine.movers:
         movers = module.array("movers", core.dtype("Mover"), len(machine.movers), of="Laws")

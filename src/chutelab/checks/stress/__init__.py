@@ -128,7 +128,7 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
     gain = balance["kinetic"] + balance["potential"] - start - balance["belt_work"]
     if stepped and not e.machine.gravity:
         # The removal of overlaps may give energy: in each step so much and no more. With gravity
-        # only `parted` is allowed in the whole run, as a pile must not live on its overlaps.
+        # only `held` is allowed in the whole run, as a pile must not live on its overlaps.
         change = np.diff(gain)
         up = np.flatnonzero(change > 0.0)
         given = laws.opened(recording, np.concatenate([times[up], times[up + 1]]))
@@ -138,7 +138,8 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
     at = int(np.argmax(rise))
     b = e.bounds
     where = f"of {b.energy:.3g} J, at t = {times[at]:.6g} s"
-    return Verdict(float(rise[at]) / b.energy, b.energy_bound + b.parted / b.energy, where)
+    allowed = b.held if stepped and e.machine.gravity else b.parted
+    return Verdict(float(rise[at]) / b.energy, b.energy_bound + allowed / b.energy, where)
 
 
 def _instants_of_tracks(e: Evidence) -> Floats:

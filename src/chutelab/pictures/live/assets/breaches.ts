@@ -50,7 +50,7 @@ function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: R
     interact: Number(interact || states.length + joints.length > 0),
     mover_count: movers.length, swing_count: states.length, pulley: Number(!!pulley),
     outline_count: outlines.flat().length, kind_count: machine.pairRestitution.length,
-    tilt, dt, joined: Number(joints.length > 0),
+    tilt, dt, joined: Number(joints.length > 0), cohesion: Math.max(0, ...machine.cohesion.flat()),
     largest: radius.reduce((most, own) => Math.max(most, own), 0), ...run,
   });
   core.work("lay_out_laws");

@@ -92,6 +92,21 @@ def test_the_error_that_is_told_is_how_far_answers_are_off(function, noise, wish
     assert np.all(told < 8.0 * off + 0.0025 * np.array([40.0, 1.0])), (off, told)
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_beside_a_jump_the_value_that_is_told_is_that_of_runs(seed):
+    """The work of a belt falls with the angle, until from 22° on the plate is no longer met."""
+
+    def work(a):
+        return (np.where(a < 22.0, 20.5 - 0.024 * (a + 4.0) ** 2, -1.5),)
+
+    angle = Span("a", "", -10.0, 30.0, None)
+    found = search(Drawn(work, (0.2,), 1.0, seed), Wishes(objective=0), (angle,), 8, 24, seed)
+    (value, error), at = found.quantities[0], found.at[0]
+    assert at >= 22.0
+    assert value == pytest.approx(-1.5, abs=4.0 * error)
+    assert error < 0.5
+
+
 def test_what_is_wished_is_computed_from_means_of_seeds():
     """Two seeds by hand: differences, limits both ways, mean + 2 s, the share that has numbers."""
     values = np.array([[[1.0, 0.5, 0.9], [3.0, 0.5, 0.8]]])

@@ -368,7 +368,10 @@ MISTAKES = {
         "both parts into the plate": lambda g: (
             g.v0 * cos(radians(g.alpha)) + g.vy * sin(radians(g.alpha))
         ),
-        "sine and cosine exchanged": along,
+        "component along the plate": along,
+        "sine and cosine exchanged": lambda g: (
+            g.v0 * sin(radians(g.alpha)) - g.vy * cos(radians(g.alpha))
+        ),
         "the fall forgotten": lambda g: g.v0 * cos(radians(g.alpha)),
         "the plate not turned": lambda g: g.v0,
         "degrees for radians": lambda g: g.v0 * cos(g.alpha) - g.vy * sin(g.alpha),

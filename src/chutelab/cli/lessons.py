@@ -50,7 +50,7 @@ LessonNames = Annotated[Texts, FileName(), complete_lesson]
 
 @main.group(
     cls=InOrder,
-    short_help="Lessons: list, show, build, start, grade, bundle, package.",
+    short_help="Lessons: list, show, new, page, build, grade, scorm and more.",
     epilog="Begin with: chutelab lesson list, then: chutelab lesson show 1",
 )
 def lesson() -> None:

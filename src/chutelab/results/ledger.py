@@ -113,9 +113,11 @@ class Ledger(Shown):
 
         names = [*dict.fromkeys(chain.from_iterable(self.by_surface.values()))]
         total = [getattr(self, name) for name in names]
+        kept = {"kinetic": self.kinetic, "potential": self.potential}
+        kept |= {"spring": self.spring} if any(self.spring) else {}
         moved = (
             f"{name} {told(before, UNSEEN)} -> {told(after, UNSEEN)} J"
-            for name, (before, after) in (("kinetic", self.kinetic), ("potential", self.potential))
+            for name, (before, after) in kept.items()
         )
         rows = [
             (name, [entries.get(entry, 0.0) for entry in names])

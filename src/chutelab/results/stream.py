@@ -293,7 +293,7 @@ class Crowd(Shown):
     width : float or None
         Of the material, m.
     thick : dict of float
-        By stream, the width of its envelope half-way to the belt, m: 96 % of the paths lie within.
+        By stream, the width of its envelope half-way along its way, m: 96 % of the paths lie within.
         Only streams that have an envelope there.
     """
 
@@ -337,7 +337,7 @@ class Crowd(Shown):
                 said = f"{number(self.whole_flow)} t/h, {self.width:g} m wide ({said})"
             notes.append(f"flow onto the belt: {said}")
         notes += [
-            f"{name}: half-way to the belt, 96 % of the paths lie within {1e3 * size:.3g} mm"
+            f"{name}: half-way along its way, 96 % of the paths lie within {1e3 * size:.3g} mm"
             for name, size in self.thick.items()
         ]
         heads = ("", *COLUMNS.values()) if rows else ()

@@ -390,7 +390,7 @@ class Coverage:
 
 
 WORDS = {
-    Reason.OUTSIDE: "The paper's equations are about another machine",
+    Reason.OUTSIDE: "The paper's equations do not hold for this machine",
     Reason.EARLY: "The equations stop short of a contact they know nothing of",
     Reason.NO_IMPACT: "The particle flies past the plate, and the equations end with the flight",
     Reason.SECOND: "After the plate it meets something else before it lands",

@@ -407,8 +407,11 @@ class _Search:
         values, errors = zip(*numbers, strict=True)
         keys = len(self.ranges)
         _, wanted = self.told(np.array([mean for mean, _ in found.quantities]))
+        course = "not looked at"
+        if self.evaluate.stopped is None:
+            course = self.evaluate(np.reshape(values[:keys], (1, keys))).touches[0]
         return Answer(
-            values[:keys], values[keys:], wanted, "",
+            values[:keys], values[keys:], wanted, course,
             "end" if self.goal != "solve" and at_end else "inside",
             errors=errors[:keys], found_errors=errors[keys:],
         )  # fmt: skip

@@ -42,7 +42,8 @@ class Answer:
     wanted : tuple of float
         The right sides of the targets; empty without targets.
     course : str
-        Surfaces that particle 0 touches up to its landing.
+        Surfaces that particle 0 touches up to its landing; with several seeds those that the
+        particles of the scene's own seed touch, as in `sweep`.
     place : str
         "inside" the range, at an "end" of it, or at a "change" of the course.
     sensitivities : tuple of Sensitivity

@@ -297,16 +297,26 @@ def search(
                 # Fit once more, to report the results so far.
                 evaluate.stopped, nexts = interrupt, nexts[:0]
                 continue
-            if ends or fit.done:
+            if ends:
                 break
             nexts = open_[: min(BATCH, most - len(shares))]
-        apart = np.any(np.abs(open_ - at) > 5.0 * error + 0.02, axis=1)
+            if fit.done:
+                # Beside a jump, such as where a plate is no longer met, a fit overshoots; so the
+                # answer is a place where variants have run.
+                if np.any(np.all(np.abs(shares - at) <= error + BESIDE, axis=1)):
+                    break
+                nexts = at[np.newaxis]
+        apart = np.any(np.abs(open_ - at) > 5.0 * error + BESIDE, axis=1)
         points = np.clip(low + shares * width, low, high)
         reports = [
             Model(shares, *fit.of_means(values[..., n]), seeds).at(at)
             for n in range(values.shape[2])
         ]
     return Found(low + at * width, error * width, points, values, float(apart.mean()), reports)
+
+
+BESIDE: Final = 0.02
+"""Share of a range; two places that are no further apart are told as one."""
 
 
 NOWHERE: Final = 1e30

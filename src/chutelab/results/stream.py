@@ -293,7 +293,7 @@ class Crowd(Shown):
     width : float or None
         Of the material, m.
     thick : dict of float
-        By stream, the width of its envelope half-way along its way, m: 96 % of the paths lie within.
+        By stream, the width of its envelope half-way along, m: 96 % of the paths lie within it.
         Only streams that have an envelope there.
     """
 

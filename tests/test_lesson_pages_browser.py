@@ -110,6 +110,8 @@ def test_it_is_played_through(page_of, name, by, kind):
     for n, step in enumerate(lesson.steps):
         assert step_of(page) == n
         expect(page.locator("[aria-current=step]")).to_have_count(1)
+        # What was seen in the step before is not seen in this one.
+        assert n not in page.evaluate("chutelab.lesson.kept.done")
         # Only what the step allows can be changed.
         live = page.evaluate("chutelab.lab.data.live.controls")
         assert len(live) == len(step.open(tuple(lesson.page.live.get("controls", ()))))
@@ -200,11 +202,13 @@ def counted(hand, lesson, kind):
         typed = {"right": f"{right:.5g}", "wrong": f"{0.5 * right:.5g}", "odd": "about 3,5 metres"}
         hand.write(question.locator("input"), typed[kind])
         hand.press(question.locator(".check"))
-        verdict = question.locator(".reply").get_attribute("data-verdict")
+        reply, bar = question.locator(".reply"), page.locator(".turnbar")
+        above = reply.evaluate("(one) => one.getBoundingClientRect().bottom")
+        assert above <= bar.bounding_box()["y"]
+        verdict = reply.get_attribute("data-verdict")
         assert (verdict == "right") == (kind == "right")
         if kind == "wrong":
-            reply = task.check(n, float(typed[kind]))
-            assert reply.text in question.locator(".reply").inner_text()
+            assert task.check(n, float(typed[kind])).text in reply.inner_text()
         if kind == "odd":
             assert verdict == "unread"
 

@@ -305,8 +305,15 @@ def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(
     for _ in range(3):
         page.keyboard.press("PageUp")
     x = float(page.locator(".guess").get_attribute("aria-valuenow"))
+    # The flag has a pole, and a foot in it.
+    pole, foot = (page.locator(f".guess .{part}").evaluate(
+        "(one) => [getComputedStyle(one).stroke, getComputedStyle(one).fill]")
+        for part in ("pole", "foot"))  # fmt: skip
+    assert pole[0] == foot[0] != foot[1]
+    expect(page.locator("#show-all")).to_be_visible()
     page.click("#play")
     assert page.evaluate("chutelab.lab.playing")
+    expect(page.locator("#show-all")).to_be_hidden()
     assert page.evaluate(dots) > 0
     assert all(page.locator(one).is_visible() for one in ("#numbers", "#energy", ".tools"))
     off = abs(landing_of(load("inclined-40")) - x) * 100
@@ -329,6 +336,7 @@ def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(
     page.click("#play")
     said = page.inner_text("#guess")
     assert float(said.split(" by ")[1].split(" cm")[0]) < 200 / scale
+    page.evaluate("chutelab.lab.reset()")
     page.click("#show-all")
     page.select_option("#presets", label="Moon")
     expect(page.locator("#numbers")).to_be_visible()
@@ -356,7 +364,7 @@ ranges = { "plate.angle_deg" = [20, 60] }
     angle = page.locator("#edit input")
     angle.fill("61")
     angle.press("Enter")
-    assert "from 20 to 60" in page.inner_text(".why")
+    assert "between 20 and 60" in page.inner_text(".why")
     assert value(page, "plate.angle_deg") == 40.0
     page.focus("[data-id='plate.angle_deg']")
     for _ in range(4):

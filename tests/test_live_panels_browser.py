@@ -215,6 +215,17 @@ def test_marks_on_the_time_tell_what_happens_and_lead_there(shown):
         assert said_by(page, "#time") == says[n]
         tips = [mark["tip"] for mark in page.evaluate(MARKS)]
         assert tips == ["none"] * n + [f'"{says[n]}"'] + ["none"] * (2 - n)
+    # What it says lets the pointer through to what is below, and goes after a while.
+    says_now = page.locator(".marks .now")
+    hit = says_now.evaluate("""(one) => {
+      const { left, top } = one.getBoundingClientRect();
+      return document.elementFromPoint(left + 20, top - 20).closest(".marks");
+    }""")
+    assert hit is None
+    shows = "(one) => getComputedStyle(one, '::after').visibility"
+    assert says_now.evaluate(shows) == "visible"
+    page.evaluate("document.getAnimations().forEach((one) => one.finish())")
+    assert says_now.evaluate(shows) == "hidden"
     page.locator(".marks button").nth(2).click()
     assert [mark["done"] for mark in page.evaluate(MARKS)] == [True] * 3
     page.keyboard.press("ArrowLeft")

@@ -867,6 +867,7 @@ def test_the_empty_page_and_the_card_are_accessible_and_fingers_hit(empty, size,
     viewport = {"width": size[0], "height": size[1]}
     page = empty("de", viewport=viewport, color_scheme=scheme, has_touch=touch, is_mobile=touch)
     assert axe(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth") == size[0]
     page.click("#begin")
     page.evaluate(DONE)
     page.evaluate("chutelab.bench.inspector.choose('incoming')")

@@ -710,7 +710,18 @@ def test_on_a_phone_one_card_or_drawer_lies_under_the_picture(shown, name, size)
         assert page.evaluate(SMALL) == []
 
     look()
-    assert page.locator("#numbers" if name == "stream" else "#energy").is_visible()
+    first = page.locator("#numbers" if name == "stream" else "#energy")
+    assert first.is_visible()
+    # What comes up again shows what was changed under a chosen part.
+    seen, said = playwright.expect(first), first.inner_text()
+    page.evaluate("chutelab.bench.inspector.choose('incoming')")
+    seen.to_be_hidden()
+    page.evaluate("chutelab.lab.change({ 'incoming.speed': 3 })")
+    page.evaluate(DONE)
+    page.evaluate("chutelab.bench.inspector.choose()")
+    seen.to_be_visible()
+    assert first.inner_text() != said
+    page.evaluate("chutelab.lab.undo()")
     for tab in page.locator(".tabs button").all():
         tab.click()
         playwright.expect(page.locator(f"#{tab.get_attribute('data-of')}")).to_be_visible()

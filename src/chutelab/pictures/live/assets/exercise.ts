@@ -141,6 +141,7 @@ class Questions {
       reply.setAttribute("data-verdict", verdict);
       reply.className = `reply ${verdict}`;
       this.tell();
+      reply.scrollIntoView({ block: "nearest" });
     };
     const showHint = (hint: number) => {
       const { title: which, text: said, last } = task.hintAt(n, hint);

@@ -314,6 +314,8 @@ class Lesson {
   go(n: number) {
     const { kept, words, lesson: { steps, title } } = this;
     if (!steps[n] || n > this.reach) return;
+    // The run of the step before must not count as seen in this one.
+    this.lab.t = this.lab.start;
     this.clear();
     kept.at = n;
     const step = steps[n];

@@ -122,9 +122,6 @@ class Phone {
   choose(tab: string) {
     this.tab = tab;
     this.show("");
-    const card = document.getElementById(tab) as HTMLDetailsElement;
-    // It may have changed while it was hidden.
-    if (card.matches("details")) card.dispatchEvent(new Event("toggle"));
   }
 
   refresh() {
@@ -142,8 +139,12 @@ class Phone {
     }
     for (const card of cards) {
       const off = this.is.matches && card.id !== on;
+      const isNew = card.matches(".off") && !off;
       if (card.matches(".off") !== off) card.classList.toggle("off", off);
-      if (this.is.matches && card.matches("details")) card.open = true;
+      if (!card.matches("details")) continue;
+      if (this.is.matches) card.open = true;
+      // It may have changed while it was hidden.
+      if (isNew) card.dispatchEvent(new Event("toggle"));
     }
   }
 

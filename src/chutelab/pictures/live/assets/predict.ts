@@ -316,7 +316,6 @@ class Prediction {
     this.note = document.getElementById("guess") as any;
     this.show = document.getElementById("show-all") as any;
     this.flag = new Flag(stage, lab, words, "landing", () => this.tell(), "guess");
-    this.show.hidden = false;
     this.show.textContent = words.say("show-at-once");
     this.show.addEventListener("click", () => {
       this.always = !this.always;
@@ -372,6 +371,7 @@ class Prediction {
       : isFinite(off) ? words.say("mark-off", { distance: words.number(100 * off, 3) })
         : isOver ? words.say("mark-none") : "";
     this.note.hidden = !said;
+    this.show.hidden = !hides && !always;
     // Screen readers read only changes.
     if (this.note.textContent !== said) this.note.textContent = said;
   }

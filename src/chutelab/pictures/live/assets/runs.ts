@@ -216,7 +216,7 @@ class Runs {
       const head = row && !this.isByHand ? html("button", { class: "set",
         click: () => this.set(row) }, badge, html("span", {}, ...named))
         : html("span", {}, badge, ...named);
-      const cells = columns.map(({ value, given, head: name }, k) => {
+      const cells = columns.map(({ value, given, unit, head: name }, k) => {
         if (given[n] !== undefined && given[n] !== "") {
           const said = given[n];
           return html("td", { class: "given" }, typeof said === "number"
@@ -232,9 +232,9 @@ class Runs {
           });
           return html("td", {}, input);
         }
-        const found = one?.values?.[k];
-        return html("td", one?.values ? {} : { class: "empty" }, one?.values
-          ? words.number(found ?? NaN) : words.say("to-do"));
+        const found = one?.values?.[k] ?? NaN, isCount = !unit && Number.isInteger(found);
+        return html("td", one?.values ? {} : { class: "empty" }, !one?.values ? words.say("to-do")
+          : isCount ? words.plain(found) : words.number(found));
       });
       return html("tr", n === this.latest ? { class: "new" } : {},
         html("th", { scope: "row" }, head), ...cells);

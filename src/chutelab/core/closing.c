@@ -238,7 +238,7 @@ void close_step(double h) {
         d->supports = d->mode == ASLEEP;
         if (W.length_before > 0.01 * W.step) d->impacts = 0;
         for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
-        d->lacks = d->open = 0;
+        d->lacks = d->open = d->bends = 0;
         if (d->mode == FREE) {
             d->calm += h;
             /* A particle with joints does not fall asleep. */
@@ -274,6 +274,8 @@ void close_step(double h) {
         if (!W.interact && !a->supports) a->held_count = 0;
         double past = past_of(c);
         if (!b && a->held_count < MAX_HELD) a->held[a->held_count++] = -1 - c->j;
+        double bends = !b && c->cornered ? bends_by(c) : 0;
+        a->bends = MAX(a->bends, bends);
         relative(c, 1, u);
         relative(c, 0, v);
         if (!c->halved) book_lasting(c, past, h);

@@ -14,6 +14,8 @@
 /* Distance, in radii of the inner circle, by which two particles of a crowd may move before their places are looked up
    again; the gap is then wrong by its square. */
 #define STILL 5e-4
+/* How many times the turn of a corner's path that an arc gives in a step still counts as due to the arc. */
+#define BENT 1.01
 /* Number of pairs whose places are remembered during an impact and those that follow from it. */
 #define KNOWN 8
 
@@ -59,6 +61,41 @@ static void note_look(Contact *c, int places) {
     pose_now(c, c->looked + 1);
 }
 
+/* Velocity along a surface of the place at which a particle touches it, m/s, and that place. */
+static double moves_along(const Contact *c, double *x, double *y) {
+    const Disk *a = W.disks + c->i;
+    double u[3];
+    *x = a->x + c->own[0] * c->ny - c->own[1] * c->nx;
+    *y = a->y - c->own[0] * c->nx - c->own[1] * c->ny;
+    relative(c, 0, u);
+    return u[1] + c->other[1] - c->moved[1];
+}
+
+/* Acceleration with which the inside of an arc turns the path of a corner that moves along it, m/s2. */
+static double bent_by(const Contact *c, const Surface *s) {
+    double x, y, along = moves_along(c, &x, &y);
+    if (!c->is_corner || s->shape == SEGMENT || (s->x - x) * c->nx + (s->y - y) * c->ny <= 0) return 0;
+    return along * along / s->radius;
+}
+
+/* The piece that continues a surface beyond an end that the place of a contact reaches in two steps, or left so, or -1. */
+static int next_piece(const Contact *c) {
+    double x, y, along = moves_along(c, &x, &y);
+    const Surface *s = surface_at(-1 - c->j, W.disks[c->i].t);
+    for (int n = 0; n < 2 && s->shape != CIRCLE; n++)
+        if (length_of(x - s->end[2 * n], y - s->end[2 * n + 1]) <= 2 * fabs(along) * W.step && mate_of(s, n) >= 0)
+            return mate_of(s, n);
+    return -1;
+}
+
+/* The same, also by the next piece of the surface. */
+double bends_by(const Contact *c) {
+    double t = W.disks[c->i].t, most = bent_by(c, surface_at(-1 - c->j, t));
+    int next = next_piece(c);
+    double then = next >= 0 ? bent_by(c, surface_at(next, t)) : 0;
+    return MAX(most, then);
+}
+
 /* Acceleration along the normal at which a contact would open without forces, m/s2. */
 double opens_by(const Contact *c) {
     const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
@@ -67,8 +104,9 @@ double opens_by(const Contact *c) {
     Disk place = *a;
     place.x += c->own[0] * c->ny - c->own[1] * c->nx;
     place.y += -c->own[0] * c->nx - c->own[1] * c->ny;
+    const Surface *s = surface_at(-1 - c->j, a->t);
     up += W.gx * c->nx + W.gy * c->ny;
-    return up - pulled(surface_at(-1 - c->j, a->t), &place, c->nx, c->ny, &pull);
+    return up - bent_by(c, s) - pulled(s, &place, c->nx, c->ny, &pull);
 }
 
 /* Fill in a contact at a place of particle i, which has corners, from the present states of both. */
@@ -98,6 +136,7 @@ RARELY void describe_touch(Contact *c, int i, int j, const Touch *t) {
         return;
     }
     const Surface *s = surface_at(-1 - j, a->t);
+    c->is_corner = t->which < a->corners;
     c->owner = s->owner;
     c->other[1] = surface_speed(s, c->nx, c->ny, t->x, t->y, 0);
     c->pull += W.gx * c->ny - W.gy * c->nx;
@@ -118,6 +157,74 @@ RARELY void describe_touch(Contact *c, int i, int j, const Touch *t) {
     c->pull -= pull;
     if (is_hung(-1 - j)) hang_on(c, W.movers + s->mover, &place);
 }
+
+/* Turn the directions of a contact with a surface, counterclockwise by the angle of this tangent. */
+static void turn_contact(Contact *c, double by) {
+    const Disk *d = W.disks + c->i;
+    double cosine = 1 / sqrt(1 + by * by), sine = by * cosine;
+    double *turned[] = {&c->nx, c->own, c->other, c->moved, c->lever};
+    for (int n = 0; n < 5; n++) {
+        double first = turned[n][0], second = turned[n][1];
+        turned[n][0] = cosine * first - sine * second;
+        turned[n][1] = cosine * second + sine * first;
+    }
+    for (int n = 0; n < 2; n++) {
+        double light = d->inv_mass + square(c->own[n]) * d->inv_inertia;
+        if (c->hung) light += square(c->lever[n]) / W.movers[c->hung - 1].inertia;
+        c->mass[n] = 1 / light;
+    }
+}
+
+/* Turn the normal of a contact whose corner moves along the inside of an arc, or onto or off one, as `follow` turns that
+   of disks: until it is perpendicular to the mean of the corner's velocities before and after the impulse, which then does
+   no work. `off` and `along` are that mean in the present directions of the contact, m/s, without hops by weight. Return
+   the change of the first of them. */
+static double lean(Contact *c, double off, double along) {
+    double to = (c->leans * along + off) / (along - c->leans * off);
+    to = MIN(MAX(to, -c->steep), c->steep);
+    double by = (to - c->leans) / (1 + to * c->leans);
+    turn_contact(c, by);
+    c->leans = to;
+    return by * along;
+}
+
+/* Do so for a new contact, if an arc turns the path of its corner; h is the length of the step. If the chords before and
+   after are alike the normal is right already: then it is not turned, as hops by weight are not quite alike. */
+RARELY void lean_first(Contact *c, double h) {
+    double u[3], past = 2 * past_of(c);
+    c->turns = bends_by(c);
+    if (!(c->turns > 0)) return;
+    relative(c, 0, u);
+    double along = u[1] + c->other[1] - c->moved[1], hops = 0.25 * (h - past) * (W.gx * c->nx + W.gy * c->ny);
+    c->steep = 0.5 * BENT * c->turns * W.step / fabs(along);
+    if (W.g > 0 && next_piece(c) < 0) c->steep *= fabs(h - past) / h;
+    lean(c, u[0] + 0.5 * c->need + hops, along);
+}
+
+/* The same again with the velocities that a solve has led to; return the change of their mean along the normal, m/s. */
+RARELY double lean_again(Contact *c, double h) {
+    double u[3], v[3], past = 2 * past_of(c), hops = 0.25 * (h - past) * (W.gx * c->nx + W.gy * c->ny);
+    relative(c, 1, u);
+    relative(c, 0, v);
+    return lean(c, 0.5 * (u[0] + v[0]) + hops, 0.5 * (u[1] + v[1]) + c->other[1] - c->moved[1]);
+}
+
+/* The place of a corner inside an arc after a time h, with the present velocities. */
+static Touch arc_place(const Contact *c, double h) {
+    const Disk *d = W.disks + c->i;
+    const Surface *s = surface_at(-1 - c->j, d->t + h);
+    double pose[2];
+    turn_pose(c->i, d->spin * h, pose);
+    Touch t = {.x = d->x + (d->vx + 0.5 * W.gx * h) * h + pose[0] * c->spot[0] - pose[1] * c->spot[1],
+               .y = d->y + (d->vy + 0.5 * W.gy * h) * h + pose[1] * c->spot[0] + pose[0] * c->spot[1]};
+    double x = s->x - t.x, y = s->y - t.y, away = length_of(x, y);
+    t.nx = x / away;
+    t.ny = y / away;
+    t.gap = s->radius - away;
+    return t;
+}
+
+double bent_gap(const Contact *c, double h) { return arc_place(c, h).gap; }
 
 /* The contact of the step before that was at about the same place of particle i. */
 RARELY const Contact *place_before(const Contact *c) {
@@ -160,7 +267,7 @@ RARELY int list_still(int i, int j, double h, const Contact **list, double *chan
         if (W.earlier[k].j == j) list[count++] = W.earlier + k;
     if (!count || list[0]->places != count || list[0]->two != (j >= 0 && b->mode == FREE)) return 0;
     for (int n = 0; n < count; n++)
-        if (isnan(changes[n] = gap_change_since(list[n]))) return 0;
+        if (list[n]->turns > 0 || isnan(changes[n] = gap_change_since(list[n]))) return 0;
     return count;
 }
 
@@ -230,6 +337,22 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
     return count;
 }
 
+/* Bring a contact inside an arc to where its corner is at t within the step, where its path leaves the chord. */
+static void bring_along(Contact *c, double t) {
+    double u[3];
+    if (c->is_corner && W.surfaces[-1 - c->j].shape != SEGMENT) {
+        Contact last = *c;
+        Touch place = arc_place(c, 0);
+        describe_touch(c, last.i, last.j, &place);
+        memcpy(c->impulse, last.impulse, sizeof c->impulse);
+        c->turns = last.turns;
+        c->steep = 0.5 * BENT * sqrt(c->turns / W.surfaces[-1 - c->j].radius) * W.step;
+    }
+    relative(c, 0, u);
+    double hop = (t - W.t - 0.5 * W.length) * (W.gx * c->nx + W.gy * c->ny);
+    lean(c, 0.5 * (u[0] - hop), u[1] + c->other[1] - c->moved[1]);
+}
+
 /* Before an impact, bring the contacts of an island from their hops to the smooth path: else the velocity of the hop,
    which is of first order in the step, would enter the impact. Impulses of the step that are not due yet are taken back,
    those that are due are given. This is done once a step, as the step ends soon after. Not in a crowd, which is not
@@ -259,6 +382,7 @@ static void end_hops(int i, double t) {
         Contact last = *c;
         advance(a, t);
         if (c->two) advance(b, t);
+        if (c->impulse[0] > 0 && c->cornered && c->turns > 0) bring_along(&last, t);
         was_moved(c->i);
         a->smooth = stamp;
         if (c->two) {

@@ -83,9 +83,10 @@ static double grown(double least, int impacts, int many, double skip) {
 double left_over(const Disk *d, int impacts, int surface, double radius, int sunk, double t) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
     if (has_corners(d)) {
-        /* A corner in contact comes back as fast as gravity and the rotation make it. */
+        /* A corner in contact comes back as fast as gravity, the rotation and the inside of an arc make it. */
         double haste = surface >= 0 ? hastes(surface_at(surface, d->t), d) : 0;
-        least = MAX(least, 1.000001 * (W.g + whirl_of(d) + haste) * W.step);
+        double bends = d->bends > 0 && surface >= 0 && is_held(d, surface) ? d->bends : 0;
+        least = MAX(least, 1.000001 * (W.g + whirl_of(d) + haste + bends) * W.step);
         sunk = 0;
     } else if (surface >= 0 && (W.interact || d->held_count))
         sunk = gap_to(surface_at(surface, d->t), d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius;

@@ -519,12 +519,11 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
    much. */
 static int is_even(double most) { return All.change <= most && All.back >= -most; }
 
-/* Whether particles lie on each other as a pile does, with all energy that losses give back from overlaps: they are round,
-   no surface moves, no joint pulls, and the incoming belt carries none by adhesion, which may be deep in others as it
-   leaves. */
+/* Whether particles lie on each other as a pile does, with all energy that losses give back from overlaps: no surface moves,
+   no joint pulls, and the incoming belt carries none by adhesion, which may be deep in others as it leaves. */
 static int is_pile(void) {
     int plain = L.interact && L.engine == ENGINE_CONTACT;
-    plain &= !(L.outline_count || L.mover_count || L.joined);
+    plain &= !(L.mover_count || L.joined);
     for (int i = 0; i < L.particle_count && plain; i++) plain = !L.bodies[i].group;
     return plain;
 }

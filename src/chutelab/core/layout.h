@@ -84,6 +84,7 @@ typedef struct {
     double entries[3];          /* J; belt work, restitution loss, friction loss so far */
     double gain[3];             /* J; what this step's lasting contacts add to them */
     double ahead[3];            /* J; the part of this that belongs to the second half of the step */
+    double bends;               /* m/s2; greatest acceleration by which arcs turn the paths of its corners: see `bends_by` */
     double lacks;               /* J; kinetic energy missing in the mean velocity of this step's impulses inside an arc,
                                    see `account` */
     double force[2], pushed[2]; /* N; push by hand, in this step and in the one before ... */
@@ -283,9 +284,10 @@ typedef struct {
     double entries[3], later[3]; /* J; ledger entries of its impulses, and of the part of them that belongs to this
                                     step, see `account`; of a halved contact those of its first half */
     double given[2];        /* J; the same for the belt that carries the partner */
-    double turns;           /* m/s2; acceleration by which an arc turns the path of a disk in a crowd, else 0 */
+    double turns;           /* m/s2; acceleration by which an arc turns the path of a disk in a crowd or of a corner, or 0 */
+    double leans, steep;    /* ... and tangent of the angle by which the normal of a corner is turned for it, at most `steep` */
     double free_gap, bend;     /* m; gap at the end of the step without impulses, and change of it by impulses beyond
-                                  the linear one: see `bends` */
+                                  the linear one: see `bends`, `bends_off` */
     int i, j;
     int two;                /* whether j is a free disk, which also gets the impulse */
     int owner;              /* of the ledger entries */
@@ -301,6 +303,7 @@ typedef struct {
     double looked[7];       /* m, rad; when the place was looked up: the gap, and x, y and `turned` of i and of j */
     int places;             /* number of places at which the two touched then */
     int stalls;             /* its surface has stalled in this step, see solver.c */
+    int is_corner;          /* the place is a corner of i on a surface, from the inside if that is an arc */
     double mean[2];         /* N; running mean of its force on i, see sleep.c; NaN before the first step */
 } Contact;
 

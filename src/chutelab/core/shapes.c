@@ -231,7 +231,7 @@ void fill_in(const Shape *a, const Shape *b, Touch *t) {
 /* The side of a segment that a corner is on: usually its own. If the line from the corner to the centre, which is inside
    the particle, crosses the segment, the corner has passed through, and its side is that of the centre. This also holds
    up to `near` beyond an end at which another segment continues to that side, since a corner that overlaps two walls is
-   beyond the end of each. */
+   beyond the end of each; or at which the surface continues smoothly. */
 int side_of(const Shape *a, const Surface *s, int corner, double near) {
     double x = a->p[corner][0] - s->x, y = a->p[corner][1] - s->y, u = a->x - s->x, v = a->y - s->y;
     double off = y * s->tx - x * s->ty, mid = v * s->tx - u * s->ty, both = fabs(off) + fabs(mid);
@@ -239,7 +239,8 @@ int side_of(const Shape *a, const Surface *s, int corner, double near) {
     if (own == centre) return own;
     double cut = ((x * s->tx + y * s->ty) * fabs(mid) + (u * s->tx + v * s->ty) * fabs(off)) / both;
     int hollow = centre > 0 ? 1 : 2, sunk = fabs(off) <= near;
-    double low = sunk && (s->hollows[0] & hollow) ? -near : 0, high = sunk && (s->hollows[1] & hollow) ? near : 0;
+    double low = sunk && ((s->hollows[0] & hollow) || mate_of(s, 0) >= 0) ? -near : 0;
+    double high = sunk && ((s->hollows[1] & hollow) || mate_of(s, 1) >= 0) ? near : 0;
     return cut >= low && cut <= s->length + high ? centre : own;
 }
 

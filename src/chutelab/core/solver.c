@@ -172,6 +172,41 @@ static void solve_alone(Contact *list, int count) {
     }
 }
 
+/* Change of the gap of a corner inside an arc at the end of the step by its impulses, m, other than along its normal. */
+static double bends_off(const Contact *c, double h) {
+    double u[3], v[3];
+    if (!c->is_corner || W.surfaces[-1 - c->j].shape == SEGMENT) return 0;
+    relative(c, 1, u);
+    relative(c, 0, v);
+    return bent_gap(c, h) - c->free_gap - h * (v[0] - u[0]);
+}
+
+/* The same for an island with corners inside arcs, whose normals lean on the velocities that the impulses lead to. The next
+   step begins with what the last solve leaves. */
+static void solve_bent(Contact *list, int count, int rounds, int sweeps, double accurate, double enough, double fine) {
+    double h = W.step_end - W.t;
+    for (double last = INFINITY;;) {
+        double most = 0;
+        sweep_contacts(list, count, rounds, sweeps, PLAIN, accurate, enough);
+        for (int n = 0; n < count; n++) {
+            Contact c = list[n];
+            if (!(c.cornered && c.turns > 0)) continue;
+            double leans = h * fabs(lean_again(&c, h)), bends = fabs(bends_off(list + n, h) - c.bend);
+            most = MAX(most, MAX(leans, bends));
+        }
+        int ends = most <= fine || !(most < SHRINKS * last);
+        for (Contact *c = list; c < list + count; c++) {
+            if (!(c->cornered && c->turns > 0)) continue;
+            if (!ends) lean_again(c, h);
+            double bend = bends_off(c, h);
+            if (!ends) c->need -= (bend - c->bend) / h;
+            c->bend = bend;
+        }
+        if (ends) return;
+        last = most;
+    }
+}
+
 /* Where the slip of a lone disk reverses within a step because friction cannot hold it, friction reverses at that instant.
    The sweeps would bring the slip to zero, which is wrong in first order. */
 static void turn_slip(Contact *c) {
@@ -266,7 +301,7 @@ void solve_contacts(int again) {
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
         double least = INFINITY, heaviest = 0;
-        int driven = 0, pushed = 0, cornered = 0, tied = 0, stirred = 0, rests = 0, halved = 1;
+        int driven = 0, pushed = 0, cornered = 0, tied = 0, stirred = 0, rests = 0, bent = 0, halved = 1;
         W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
@@ -277,6 +312,7 @@ void solve_contacts(int again) {
             pushed |= c->moved[0] > 0;
             W.swings_too |= c->hung > 0;
             cornered |= c->cornered;
+            bent |= c->cornered && c->turns > 0;
             rests |= sleeps(c->j);
             tied |= is_tied(c->i) || is_tied(c->j);
             stirred |= (a->supports && a->rest == 0) || (b->supports && b->rest == 0);
@@ -307,7 +343,8 @@ void solve_contacts(int again) {
         for (Contact *c = list; c < list + to - from && pushed && rests; c++)
             if (sleeps(c->j)) W.disks[c->j].stirred = 1;
         int rounds = pushed && rests ? 1 : MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS);
-        if (W.interact) sweep_contacts(list, to - from, rounds, sweeps, PLAIN, accurate, W.skip * least);
+        if (bent) solve_bent(list, to - from, rounds, sweeps, accurate, W.skip * least, FINE * least);
+        else if (W.interact) sweep_contacts(list, to - from, rounds, sweeps, PLAIN, accurate, W.skip * least);
         else solve_alone(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);

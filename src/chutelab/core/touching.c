@@ -149,10 +149,19 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > parts)) return 1;
     /* Cohesion keeps a gap from opening; it never closes one. */
     double closed = MIN(c->gap, cohesion > 0 ? MAX(later, 0) : 0), aim = ask(c, closed, later, least, h);
+    if (place && j < 0) {
+        if (last && last->turns > 0) {
+            c->bend = last->bend;
+            c->need -= c->bend / h;
+        }
+        lean_first(c, h);
+        relative(c, 0, u);
+    }
     c->drift = 0.5 * h * c->pull;
     if (cornered && W.g == 0) {
-        /* Without weight no hop is larger than the fall before it: nothing would supply the energy. */
-        c->need = MIN(c->need, c->parts + MAX(-2 * u[0], 0));
+        /* Without weight no hop is larger than the fall before it, or than an arc makes it: nothing would supply the
+           energy. */
+        c->need = MIN(c->need, c->parts + MAX(-2 * u[0], c->turns * h));
         c->drift = MIN(MAX(c->drift, -fabs(u[1])), fabs(u[1]));
     }
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;

@@ -35,7 +35,7 @@ function sampleAt(recording: Recording, index: number, t: number): Sample | null
   if (!state) return null;
   const { x, y, vx, vy } = state;
   const ledger = recording.ledgerOf(index, t) as Ledger;
-  const low = recording.machine.mass[index] * recording.machine.gravity * track.lowest;
+  const { mass, gravity, ground } = recording.machine, low = mass[index] * gravity * ground;
   return { ...ledger, potential: ledger.potential - low, t, x, y, vx, vy, v: Math.hypot(vx, vy) };
 }
 

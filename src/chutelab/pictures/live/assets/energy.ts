@@ -33,12 +33,12 @@ function stacks(ledger: Ledger) {
   return { putIn: side(1).filter(shown), isNow: side(-1).filter(shown), size };
 }
 
-/** The ledger with heights from the lowest point of the run, so that no part of it is negative. */
+/** The ledger with heights from the machine's lowest point; only what has left it is lower. */
 function groundedLedger(recording: Recording, t: number) {
   const ledger = recording.ledger(Math.min(t, recording.end)), { machine } = recording;
   // Only of released particles, as others have no part in the ledger yet.
   const low = recording.tracks.reduce((sum, track, i) => (track.begin <= t
-    ? sum + machine.mass[i] * machine.gravity * track.lowest : sum),
+    ? sum + machine.mass[i] * machine.gravity * machine.ground : sum),
   machine.movers.reduce((sum, { moment }) =>
     sum - machine.gravity * Math.hypot(...moment), 0));
   return { ...ledger, start: ledger.start - low, potential: ledger.potential - low };

@@ -1,6 +1,6 @@
 // `build`: a scene as a machine, the same numbers as those of Python's `chutelab.machine`, to the
 // last bit: the core lays the surfaces and draws the releases.
-import { lay, type Mover } from "./plan.ts";
+import { lay, memory, type Mover } from "./plan.ts";
 import { draw, type Release } from "./releases.ts";
 import {
   Fault, cohesionOf, met, passes, polygonMoment, triggersOf, type Joint, type Point, type Scene,
@@ -63,6 +63,7 @@ export interface Machine {
   gravity: number;
   tilt: number; // rad; angle of gravity from straight down
   up: [number, number]; // against gravity
+  ground: number; // m; lowest height of surfaces, releases, and what moves or hangs
   air: number; // kg/m³, density of still air; 0 without
   landing: number; // index of the outgoing belt, -1 without one
   until: "landed" | "settled" | "time";
@@ -127,6 +128,7 @@ export function build(scene: Scene): Machine {
   for (const release of releases) last = Math.max(last, release.t);
   const bound = last + run.max_time;
   const tilt = scene.gravity_deg * RADIANS, [sin, cos] = sinCos(tilt);
+  const up: [number, number] = [-sin, cos];
   const pairs = every.map((a) => every.map((b) => met(scene, a, b)));
   // Boxes all run at once, even if they do not interact.
   const outlines = particles.map(({ outline }) => outline);
@@ -138,7 +140,8 @@ export function build(scene: Scene): Machine {
     surfaces: names,
     gravity: scene.gravity,
     tilt,
-    up: [-sin, cos],
+    up,
+    ground: groundOf(releases, up),
     air: scene.air_density,
     landing: names.indexOf("outgoing"),
     until: typeof run.until === "string" ? run.until : "time",
@@ -169,6 +172,16 @@ export function build(scene: Scene): Machine {
     rolling: particles.map((kind) => kind.rolling_friction),
     falls: particles.map(({ restitution_speed: v }) => v === undefined ? 0.0 : 1.0 / v),
   });
+}
+
+/** Returns the lowest height that is still in the scene, m: only what leaves it comes lower. Boxes
+ * have no ends on sides to which gravity does not pull. */
+function groundOf(releases: Release[], up: [number, number]) {
+  const { EXIT_MARGIN: margin } = memory().layout.constants;
+  return releases.reduce((ground, { exitBox }) => Math.min(ground, up.reduce((height, share, n) => {
+    const end = share > 0 ? exitBox[n] + margin : exitBox[n + 2] - margin;
+    return isFinite(end) ? height + share * end : height;
+  }, 0)), Infinity);
 }
 
 /** Restitution that marks two kinds that pass through each other. */

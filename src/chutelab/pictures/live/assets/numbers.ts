@@ -78,7 +78,8 @@ class NumbersPanel {
     this.reason = html("p", { class: "note" });
     this.lone = html("div", {}, html("table", {}, head, this.body), this.reason);
     this.crowd = html("tbody");
-    this.lead = html("table", { class: "crowd" }, this.crowd);
+    const when = html("caption", { class: "note" }, words.say("numbers-when"));
+    this.lead = html("table", { class: "crowd" }, when, this.crowd);
     this.asked = html("details", { class: "values" }, html("summary", {}, words.say("particle-0")));
     const panel = card("numbers", words.say("numbers"), this.lead, this.asked, this.lone);
     this.asked.before(this.lone);

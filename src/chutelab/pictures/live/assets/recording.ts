@@ -22,10 +22,9 @@ const MOST_CHORDS = 500;
 
 /** Knots of one particle, `KNOT_ROW` doubles each. */
 class Track {
-  /** @param up the direction against gravity
-   * @param tells whether its knots have angles, so that boxes and polygons have theirs to the last
+  /** @param tells whether its knots have angles, so that boxes and polygons have theirs to the last
    * bit */
-  constructor(readonly up: [number, number] = [0, 1], readonly tells = false) {}
+  constructor(readonly tells = false) {}
 
   rows = new Float64Array(8 * KNOT_ROW);
 
@@ -66,35 +65,6 @@ class Track {
     return this.rows[knot * KNOT_ROW + column];
   }
 
-  /** Lowest place so far, m. */
-  get lowest() {
-    const sure = this.count - this.tip;
-    for (; this.seen < sure; this.seen += 1) this.low = Math.min(this.low, this.lowAt(this.seen));
-    let low = this.low;
-    for (let n = sure; n < this.count; n += 1) low = Math.min(low, this.lowAt(n));
-    return low;
-  }
-
-  /** Lowest place of a knot and of the curve to it, m: where its slope, a quadratic, is 0. */
-  lowAt(i: number) {
-    const [across, up] = this.up;
-    const of = (knot: number, x: number, y: number) =>
-      across * this.at(knot, x) + up * this.at(knot, y);
-    const y = of(i, X, Y), h = i ? this.at(i, T) - this.at(i - 1, T) : 0;
-    if (!(h > 0)) return y;
-    const va = of(i - 1, VX, VY), vb = of(i, VX, VY), mean = (y - of(i - 1, X, Y)) / h;
-    const a = 3 * (va + vb - 2 * mean), b = 3 * mean - 2 * va - vb;
-    const q = -(b + Math.sign(b || 1) * Math.sqrt(Math.max(0, b * b - a * va)));
-    return [q / a, va / q].reduce((low, s) =>
-      (s > 0 && s < 1 ? Math.min(low, across * this.placeOn(i - 1, X, VX, h, s)
-        + up * this.placeOn(i - 1, Y, VY, h, s)) : low), y);
-  }
-
-  /** The lowest of the first so many knots. */
-  low = Infinity;
-
-  seen = 0;
-
   get begin() {
     return this.count ? this.rows[0] : Infinity;
   }
@@ -133,8 +103,6 @@ class Track {
     const { x, y, vx, vy, spin } = state, angle = this.angle(t);
     this.count = this.knotBefore(t) + 1;
     this.turns.length = Math.min(this.turns.length, this.count);
-    this.low = Infinity;
-    this.seen = 0;
     this.near = 0;
     this.tip = 0;
     this.add([t, x, y, vx, vy, spin, ...entries, 0, angle], 0, 0, null);
@@ -261,8 +229,8 @@ function namesOf({ releases, streams }: Machine) {
   });
 }
 
-const trackOf = ({ up, outlines, releases }: Machine, i: number) =>
-  new Track(up, outlines[releases[i].kind].length > 0);
+const trackOf = ({ outlines, releases }: Machine, i: number) =>
+  new Track(outlines[releases[i].kind].length > 0);
 
 /** The tracks and events of a run, which may still be running. */
 class Recording {

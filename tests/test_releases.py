@@ -331,3 +331,94 @@ def test_layers_on_a_slow_pulley_ride_into_each_other(speed):
 )
 def test_where_none_rides_into_another_nothing_is_said(overrides):
     assert bed(*overrides)[1] is None
+
+
+def is_refused(tables):
+    try:
+        build(scene.from_dict(tables))
+    except scene.SceneError as error:
+        return "inside" in str(error)
+    return False
+
+
+def depth(outline, points):
+    """How deep the deepest of the points lies in a convex polygon, m; negative outside."""
+    sides = np.roll(outline, -1, axis=0) - outline
+    away = points[:, None] - outline
+    across = sides[:, 0] * away[..., 1] - sides[:, 1] * away[..., 0]
+    return (across / np.hypot(*sides.T)).min(axis=1).max()
+
+
+@pytest.mark.parametrize("kind", ["line", "arc", "pulley"])
+def test_a_polygon_is_refused_exactly_where_a_surface_passes_through_it(kind):
+    """Of random boxes and triangles, against many points of the surface."""
+    rng, told = np.random.default_rng(1), {True: 0, False: 0}
+    for draw in range(150):
+        size, turn = rng.uniform(0.02, 0.5, 2), rng.uniform(-np.pi, np.pi)
+        corners = size * [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
+        shape = {"shape": "box", "size": size.tolist()}
+        if draw % 2:
+            angles = rng.uniform(0.0, 2.0, 3) + np.array([0.0, 2.1, 4.2])
+            corners = size * np.column_stack([np.cos(angles), np.sin(angles)])
+            corners -= corners.mean(axis=0)
+            shape = {"shape": "polygon", "points": corners.tolist()}
+        at, radius = rng.uniform(-0.4, 0.4, 2), rng.uniform(0.02, 0.4)
+        c, s = np.cos(turn), np.sin(turn)
+        outline = corners @ np.array([[c, s], [-s, c]]) + at
+        share, tables = np.linspace(0.0, 1.0, 3_001)[:, None], {}
+        if kind == "line":
+            a, b = rng.uniform(-0.5, 0.5, (2, 2))
+            points = a + share * (b - a)
+            tables["surface"] = [{"name": "s", "from": a.tolist(), "to": b.tolist()}]
+        else:
+            begin, way = rng.uniform(0.0, 360.0), rng.uniform(5.0, 330.0)
+            way = 360.0 if kind == "pulley" else way
+            angles = np.radians(begin + share * way)
+            points = radius * np.hstack([np.cos(angles), np.sin(angles)])
+            arc = {"center": [0.0, 0.0], "radius": radius, "from_deg": begin, "to_deg": begin + way}
+            tables["surface"] = [{"name": "s", **arc}]
+        if kind == "pulley":
+            ends = {"from": [0.0, 0.0], "to": [900.0, 0.0], "pulley_radius": radius}
+            tables = {"conveyor": [{"name": "s", **ends, "speed": 0.0}]}
+            points = np.vstack([points * n for n in np.linspace(0.0, 1.0, 20)])
+            belts = np.hstack([share, np.full_like(share, radius)])
+            points = np.vstack([points, belts, belts * [1.0, -1.0]])
+        gap = np.hypot(*np.diff(points[:3_001], axis=0).T).max()
+        gap = max(gap, radius / 19) if kind == "pulley" else gap
+        deep = depth(outline, points)
+        stream = {"at": at.tolist(), "velocity": [0.0, 0.0], "angle_deg": np.degrees(turn).item()}
+        tables |= {"particle": {**shape, "mass": 0.1, "spin": True}, "stream": stream}
+        if deep > 1e-8 or deep < -gap:
+            told[deep > 0.0] += 1
+            assert is_refused(tables) == (deep > 0.0), (draw, deep)
+    assert min(told.values()) > 20
+
+
+def test_a_long_box_is_refused_across_an_arc_and_free_above_two_posts():
+    def tables(width, y, *surfaces):
+        box = {"shape": "box", "size": [width, 0.05], "mass": 0.5, "spin": True}
+        named = [{"name": f"s{n}", **one} for n, one in enumerate(surfaces)]
+        return {"particle": box, "surface": named, "stream": {"at": [0.0, y], "velocity": [0, 0]}}
+
+    bowl = {"center": [0.0, 0.0], "radius": 0.3, "from_deg": 180.0, "to_deg": 360.0}
+    # Its lower corners lie on the bowl if y = 0.025 - sqrt(0.3² - 0.25²).
+    lowest = 0.025 - np.sqrt(0.3**2 - 0.25**2).item()
+    assert is_refused(tables(0.5, lowest - 1e-8, bowl))
+    assert not is_refused(tables(0.5, lowest - 5e-10, bowl))
+    # Up to 1e-9 m are moved out: here of a box that stands on its lowest corner.
+    stands = tables(0.05, np.sqrt(2.0).item() * 0.025 - 0.3 - 5e-10, bowl)
+    stands["stream"]["angle_deg"] = 45.0
+    found = build(scene.from_dict(stands)).releases.position[0]
+    assert found == pytest.approx([0.0, np.sqrt(2.0) * 0.025 - 0.3], abs=1e-15)
+    posts = [{"from": [x, -1.0], "to": [x, 0.0]} for x in (-0.2, 0.3)]
+    assert not is_refused(tables(0.6, 0.025, *posts))
+    assert is_refused(tables(0.6, 0.025 - 1e-8, *posts))
+
+
+def test_a_surface_that_waits_to_be_touched_for_is_not_in_the_way_at_the_release():
+    gate = {"name": "gate", "from": [-1.0, 0.5], "to": [1.0, 0.5]}
+    floor = {"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0]}
+    stream = {"at": [0.0, 0.5], "velocity": [0.0, 0.0]}
+    assert is_refused({"surface": [gate, floor], "stream": stream})
+    waits = {"closes_when": {"touched": "floor"}}
+    assert not is_refused({"surface": [gate | waits, floor], "stream": stream})

@@ -20,4 +20,11 @@ int take_what_is_in_surfaces(Place *places, int count, double radius);
 int clear_releases(void);
 void box_in(void);
 
+/* within.c */
+/* How deep a piece is in a polygon, m, negative if it is outside, and the shift that clears the polygon of it. */
+typedef struct { double depth, x, y; } Clearance;
+/* For a segment, an arc round a centre, or, without both, a solid disk. */
+Clearance clear_polygon(const Start *o, const double *outline, int count, const Segment *segment, const Arc *arc,
+                        const double *center, double radius);
+
 #endif

@@ -140,13 +140,11 @@ int take_what_is_in_surfaces(Place *places, int count, double radius) {
     return D.listed_count * count;
 }
 
-/* How far a rotated box or polygon extends from its centroid in the direction (dx, dy), m: as far as its furthest corner. */
-static double reach_of_corners(const double *corners, int many, double angle, double dx, double dy) {
-    double most = -INFINITY, sine, cosine;
-    sin_cos(angle, &sine, &cosine);
-    double x = cosine * dx + sine * dy, y = cosine * dy - sine * dx;
-    for (int n = 0; n < many; n++) most = MAX(most, corners[2 * n] * x + corners[2 * n + 1] * y);
-    return most;
+/* Corners of a kind of particles. */
+static const double *outline_of(int kind) {
+    const double *first = D.corners;
+    for (int n = 0; n < kind; n++) first += 2 * (int)t->particles[n].corners;
+    return first;
 }
 
 /* Move a release out of a piece. An overlap up to ON_BELT is moved, as ten written digits may cause it; a larger one is
@@ -162,21 +160,24 @@ static void clear_release(const Piece *p, int stream, int i, double *deepest, Re
     /* A mass point may start inside a pulley. */
     if (!p->segment && !p->arc) reach = reach > 0.0 ? p->radius + reach : 0.0;
     int kind = (int)t->streams[stream].kind, corners = (int)t->particles[kind].corners;
-    if (corners) {
-        const double *first = D.corners;
-        for (int n = 0; n < kind; n++) first += 2 * (int)t->particles[n].corners;
-        reach += reach_of_corners(first, corners, o->angle, -dx / distance, -dy / distance)
-            - t->particles[kind].radius;
-    }
-    double depth = reach - distance;
+    double depth = reach - distance, center[2] = { p->x, p->y };
     double rounding = ROUNDING * MAX(MAX(fabs(point[0]), fabs(point[1])), MAX(fabs(x), fabs(y)));
-    if (depth > MAX(ON_BELT, rounding) && depth >= *deepest) {
-        *deepest = depth;
-        *refusal = (Refusal){ distance, reach, RELEASE_INSIDE, stream, i, p->surface };
+    dx *= depth / distance;
+    dy *= depth / distance;
+    if (corners) {
+        Clearance found = clear_polygon(o, outline_of(kind), corners, p->segment, p->arc, center, p->radius);
+        if (!(found.depth > rounding)) return;
+        dx = found.x;
+        dy = found.y;
+        depth = length_of(dx, dy);
     }
     if (!(depth > rounding)) return;
-    o->position[0] = x + dx * (depth / distance);
-    o->position[1] = y + dy * (depth / distance);
+    if (depth > MAX(ON_BELT, rounding) && depth >= *deepest) {
+        *deepest = depth;
+        *refusal = (Refusal){ distance, distance + depth, RELEASE_INSIDE, stream, i, p->surface };
+    }
+    o->position[0] = x + dx;
+    o->position[1] = y + dy;
 }
 
 /* List the pieces that releases of a member may overlap. */

@@ -98,7 +98,9 @@ def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
     for conveyor in scene.conveyor:
         add("ConveyorKeys", conveyor)
     for surface in scene.surface:
-        add("SurfaceKeys", surface, corners=len(surface.points or ()))
+        # What waits for another surface to be touched is not there at first.
+        waits = {"closes_at": inf} if surface.closes_when else {}
+        add("SurfaceKeys", surface, corners=len(surface.points or ()), **waits)
     for table, joint in scene.joints:
         lacks = {key: None for key in LACKS if not hasattr(joint, key)}
         begin = joint.from_ or getattr(joint, "over", None)

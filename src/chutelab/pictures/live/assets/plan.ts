@@ -69,7 +69,11 @@ function rowOf(scene: Scene, names: string[]): number[] {
     ...all("PlateKeys", scene.plates),
     ...all("OutgoingKeys", outgoing ? [outgoing] : []),
     ...all("ConveyorKeys", scene.conveyor),
-    ...all("SurfaceKeys", surface.map((one) => ({ ...one, corners: one.points?.length ?? 0 }))),
+    // What waits for another surface to be touched is not there at first.
+    ...all("SurfaceKeys", surface.map((one) => ({
+      ...one, corners: one.points?.length ?? 0,
+      closes_at: one.closes_when ? Infinity : one.closes_at,
+    }))),
     ...all("JointKeys", scene.joints.map(({ kind: tie, ...one }) => ({
       ...one, from: one.from ?? one.over, kind: core.layout.enums.Tie[tie.toUpperCase()],
     }))),

@@ -52,14 +52,7 @@ def test_the_machine_of_a_student_says_what_is_right(page_of, name):
     assert [n for n, *_ in measured] == [
         n for n, case in enumerate(cases) if case.question.measured
     ]
-    for n, value, right in measured:
-        assert right == value == pytest.approx(cases[n].right, rel=1e-6, abs=0.0)
-        # It can be looked at as soon as all that it shows was answered.
-        expect(page.locator("#machine")).to_be_hidden()
-        close = f"{0.97 * right:.6g}"
-        reply = lesson(name, "Ada").check(n + 1, float(close))
-        assert says(page, n + 1, close) == ("off", f"↻ {reply.heading}. {reply.text}")
-    page.locator("#machine").click()
+    # The picture shows the student's machine, which runs as soon as all that it shows was answered.
     for key, formula in EXERCISES[name].machine.items():
         expected = cases[0].numbers.of(formula)
         table, entry = key.split(".")
@@ -67,6 +60,19 @@ def test_the_machine_of_a_student_says_what_is_right(page_of, name):
             "([table, entry]) => chutelab.lab.given[table][entry]", [table, entry]
         )
         assert found == (expected if isinstance(expected, str) else pytest.approx(expected))
+    for n, value, right in measured:
+        assert right == value == pytest.approx(cases[n].right, rel=1e-6, abs=0.0)
+        page.click("#play")
+        assert not page.evaluate("chutelab.lab.playing")
+        expect(page.locator(".track")).to_have_count(0)
+        assert "Your machine" in page.inner_text("#guess")
+        close = f"{0.97 * right:.6g}"
+        reply = lesson(name, "Ada").check(n + 1, float(close))
+        assert says(page, n + 1, close) == ("off", f"↻ {reply.heading}. {reply.text}")
+    expect(page.locator(".track")).to_have_count(1)
+    expect(page.locator("#guess")).to_be_hidden()
+    page.click("#play")
+    assert page.evaluate("chutelab.lab.playing")
 
 
 # A page with the live page in a frame, and what it hears.

@@ -29,11 +29,10 @@ const READ_OFF: Record<number, string> = {
   1: "separation", 3: "impact", 4: "landing",
 };
 
-/** The page's scene with the numbers of an exercise's machine. */
-function machineOf(scene: Given, numbers: DrawnNumbers): Given {
-  const values = Object.entries(numbers.exercise.machine)
-    .map(([key, tree]) => [key, numbers.of(tree)]);
-  return withValues(scene, Object.fromEntries(values));
+/** The keys of an exercise's machine with a student's numbers; none without a machine. */
+function machineOf(numbers: DrawnNumbers): Record<string, unknown> {
+  return Object.fromEntries(Object.entries(numbers.exercise.machine)
+    .map(([key, tree]) => [key, numbers.of(tree)]));
 }
 
 /** Values of a run by the names of quantities: first events, and energies (J) by surface. */
@@ -55,7 +54,7 @@ function toldByRun(events: Event[], books: number[][], surfaces: string[]) {
 function measured(
   scene: Given, page: any, numbers: DrawnNumbers, engine: Engine,
 ): Promise<Map<number, number>> {
-  const machine = build(resolve(machineOf(scene, numbers), page));
+  const machine = build(resolve(withValues(scene, machineOf(numbers)), page));
   const events: Event[] = [];
   return new Promise((done) => {
     engine.run(machine, Infinity, ({ events: more, state, books }) => {
@@ -75,7 +74,6 @@ function measured(
 class Questions {
   root;
   rows;
-  machine: any;
   exercise;
 
   /** @param newEngine with a thread of its own @param changed called when an answer was given */
@@ -87,10 +85,6 @@ class Questions {
     this.exercise = exercise;
     this.measure();
     this.rows = exercise.questions.map((_, n) => this.question(task, n));
-    this.machine = this.button("machine", words.say("exercise-machine"), () => {
-      lab.replace(machineOf(lab.first, task.numbers));
-      lab.restart();
-    });
     this.root = html("div", { id: "exercise" },
       html("h3", {}, task.worded("numbers-of", { student: task.student })),
       html("table", { class: "given" }, html("tbody", {}, ...task.rows.map((
@@ -99,8 +93,10 @@ class Questions {
         html("tr", {}, html("th", { scope: "row" }, html("b", {}, symbol), ` ${meaning}`),
           html("td", {}, value))))),
       html("p", {}, task.story),
+      ...(Object.keys(exercise.machine).length ? []
+        : [html("p", { class: "note" }, words.say("exercise-picture"))]),
       ...(exercise.whole ? [] : [html("p", { class: "note" }, task.worded("untranslated"))]),
-      ...this.rows.map(({ section }) => section), this.machine, ...this.explanation(),
+      ...this.rows.map(({ section }) => section), ...this.explanation(),
       html("div", { class: "row" },
         this.button("result", words.say("exercise-result"), () => this.save(), "main")),
       html("p", { class: "note" }, words.say("exercise-result-note")));
@@ -208,12 +204,7 @@ class Questions {
   }
 
   refresh() {
-    const { task } = this;
     for (const { update } of this.rows) update();
-    // It shows the answers to its questions.
-    this.machine.hidden = !this.exercise.questions.some(({ measured: tree }) => tree)
-      || this.exercise.questions.some(({ measured: tree }, n) =>
-        tree && task.standings[n].answer === null && !task.standings[n].revealed);
   }
 
   save() {
@@ -223,4 +214,4 @@ class Questions {
   }
 }
 
-export { Questions, isInWords };
+export { Questions, isInWords, machineOf };

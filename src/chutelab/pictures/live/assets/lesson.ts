@@ -1,7 +1,7 @@
 // A lesson in the page, one step at a time: questions, keys that may be changed, notes, and
 // replies. A pupil's work is kept in this browser under the name, or by the page around this one.
 
-import { Questions, isInWords } from "./exercise.ts";
+import { Questions, isInWords, machineOf } from "./exercise.ts";
 import { plainName, type Exercise } from "./draw.ts";
 import { grown, html, icon, iconButton } from "./panels.ts";
 import { printed } from "./paper.ts";
@@ -132,7 +132,7 @@ class Lesson {
       this.go(this.kept.at + 1);
     }, "quiet");
     this.next = button("step-next", () => {
-      if (this.curtain.hides) this.commit();
+      if (this.curtain.hides && this.step.kind === "predict") this.commit();
       this.go(this.kept.at + 1);
     }, "main");
     this.where = html("span", { class: "where note" });
@@ -321,9 +321,10 @@ class Lesson {
     const step = steps[n];
     this.seen = false;
     const hides = step.kind === "predict" && !kept.done.includes(n);
+    const own = step.kind === "numbers" ? this.task : undefined;
     this.curtain.set(false);
-    this.setMachine(step.set, step.controls);
-    this.curtain.set(hides);
+    this.setMachine(own ? machineOf(own.numbers) : step.set, step.controls);
+    this.curtain.set(hides || own?.mayRun === false);
     this.stage.fit();
     this.page.dataset.kind = step.kind;
     const name = words.say(`step-${step.kind}`);
@@ -513,6 +514,7 @@ class Lesson {
         html("button", { class: "main", click: () => this.leave() }, words.say("name-first"))];
     }
     return [new Questions(lab, words, task, this.newEngine, () => {
+      if (this.curtain.hides && task.mayRun) this.curtain.set(false);
       this.look();
       this.keep();
     }).root];
@@ -531,9 +533,10 @@ class Lesson {
 
   mayPlay() {
     if (!this.curtain.hides) return true;
-    if (this.sheet.classList.contains("start") || !this.isReady) {
+    const isAsked = this.sheet.classList.contains("start") || this.step.kind === "numbers";
+    if (isAsked || !this.isReady) {
       this.sheet.classList.add("wanted");
-      (this.page.querySelector("#student, .choice:not(:has(:checked)) input, textarea")
+      (this.page.querySelector("#student, .choice:not(:has(:checked)) input, textarea, .question[open] input")
         ?? this.flag?.grip)?.focus();
       return false;
     }
@@ -586,7 +589,7 @@ class Lesson {
     const tells = then && (kind === "predict" ? this.seen && !waits : isDone);
     if (place && tells && !place.hasChildNodes()) place.append(...grown(then));
     const early = this.runs?.asked && this.runs.reason;
-    const wish = early || (kind !== "predict" || (!waits && this.seen) ? ""
+    const wish = early || (waits && kind === "numbers" ? "numbers-first" : kind !== "predict" || (!waits && this.seen) ? ""
       : waits ? this.isReady ? "predict-play" : "predict-first" : "predict-watch");
     const hint = document.getElementById("guess") as HTMLElement;
     const said = wish ? words.say(wish) : "";

@@ -150,6 +150,12 @@ class Task {
     return remarks ? `${said} (${remarks})` : said;
   }
 
+  /** Whether the student's machine may run: it shows the answers to questions measured with it. */
+  get mayRun() {
+    return this.exercise.questions.every(({ measured }, n) =>
+      !measured || this.standings[n].answer !== null || this.standings[n].revealed);
+  }
+
   /** Progress as it is reported to a learning platform. */
   get progress() {
     const { standings } = this, total = standings.length;

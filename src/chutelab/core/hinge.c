@@ -204,16 +204,18 @@ static void book_hinge(Mover *m, double f, double sign) {
 }
 
 /* Set a hinge to where it is at t, when it is struck: the step ends there. If a stop held it in this step, its motion is
-   a hop: it lies on the stop. */
+   a hop: it lies on the stop. So it does if a step would not take it away from there: a hinge at rest on its stop has an
+   angular velocity by rounding. */
 void strike_hinge(int mover, double t) {
     Mover *m = W.movers + mover;
+    double slow = AGAINST / W.usual;
     advance_hinge(m, t);
     if (m->solved) {
         note(m, t, m->rate);
         m->lies = m->impulse[0] != 0 ? 1 : m->impulse[1] != 0 ? 2 : 0;
     }
-    if (!m->lies && m->angle <= m->stops[0] + AGAINST && m->rate <= 0) m->lies = 1;
-    if (!m->lies && m->angle >= m->stops[1] - AGAINST && m->rate >= 0) m->lies = 2;
+    if (!m->lies && m->angle <= m->stops[0] + AGAINST && m->rate <= slow) m->lies = 1;
+    if (!m->lies && m->angle >= m->stops[1] - AGAINST && m->rate >= -slow) m->lies = 2;
     m->solved = 0;
     m->before = m->rate;
     W.step_end = MIN(W.step_end, t);

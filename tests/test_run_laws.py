@@ -8,6 +8,7 @@ import json
 import warnings
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from math import hypot, isnan, nan
 
 import numpy as np
@@ -648,3 +649,50 @@ def test_what_a_crowd_gets_back_at_an_instant_is_told_as_one_sum():
     assert told.t == at
     assert told.amount == pytest.approx(-each * told.particles, rel=0.05)
     assert told.amount < told.bound < 0.0
+
+
+@pytest.mark.parametrize("way", [0.0, 0.05, 0.2])
+def test_what_a_drive_gives_and_takes_back_is_turned_over(way):
+    """A box rides a board that starts and stops: its work adds up to m g `way`, and was 0.1 J."""
+    board = {"name": "board", "from": [-0.3, 0.0], "to": [0.3, 0.0], "restitution": 0.0}
+    travel = {"to": [0.0, way], "at": 0.2, "in": 0.5}
+    box = {"shape": "box", "size": [0.04, 0.04], "mass": 0.2, "spin": True}
+    recording = recorded({
+        "particle": box, "surface": [board | {"friction": 0.9, "travel": travel}],
+        **thrown((0.0, 0.02), (0.0, 0.0)), "run": {"until": 1.0},
+    }, "contact")  # fmt: skip
+    assert recording.ledger.drive_work == pytest.approx(0.2 * 9.81 * way, abs=1e-13)
+    assert not recording.laws
+    # A billionth of what it did on the way may be wrong.
+    done = np.abs(recording.knots["entries"][:, 0]).max()
+    for share, seen in ((0.5, []), (3.0, [laws.LEDGER])):
+        wrong = spoilt(recording, knots=partial(misbook, share * 1e-9 * done))
+        assert names(wrong) == seen
+
+
+def misbook(amount, knots):
+    knots["entries"][-1, 2] += amount
+
+
+def test_energy_that_a_spring_takes_between_two_knots_is_no_gain():
+    """Of two disks that turn about each other: 2.8e-4 J; but ten times that from nowhere is."""
+    kinds = [
+        {"name": "a", "radius": 0.0313, "mass": 1.779, "spin": True},
+        {"name": "b", "radius": 0.018, "mass": 0.426, "spin": True, "shape": "sphere"},
+    ]
+    streams = [
+        {"particle": "a", "at": [-0.3, 0.1756], "velocity": [0.5328, -0.8779], "interact": True},
+        {"particle": "b", "at": [-0.1, 0.1337], "velocity": [0.3906, -0.1337]},
+    ]  # fmt: skip
+    recording = recorded({
+        "gravity": 0.0, "particle": kinds, "stream": streams, "run": {"until": 0.6},
+        "spring": [{"particle": 1, "other": 0, "stiffness": 43.6, "damper": 0.1}],
+        "surface": [surface("far", (-90.0, -90.0), (90.0, -90.0))],
+    }, "contact")  # fmt: skip
+    assert not recording.laws
+
+    def faster(knots):
+        own = knots[recording.offsets[0] + 5 : recording.offsets[1]]
+        own["velocity"] *= 1.0 + 2.8e-3 / (1.779 * (own["velocity"] ** 2).sum(axis=1)[:, None])
+
+    assert laws.ENERGY in names(spoilt(recording, knots=faster))

@@ -172,6 +172,7 @@ PAIRED static int scan_track(int i) {
        least of `given_back`; and the sum of all numbers, which times zero is zero if they are finite. */
     Two place = both(0), energy = both(0), fastest = both(0), back = both(0), all = both(0);
     Two old = two_at(first + 7);
+    double worked = 0;
     for (const double *knot = first; knot <= last; knot += row) {
         Two at = size_of(two_at(knot + 1)), v = two_at(knot + 3), rest = two_at(knot + 5), losses = two_at(knot + 7);
         Two given = losses - old, squares = v * v, works = size_of(rest), lost = size_of(losses);
@@ -184,6 +185,7 @@ PAIRED static int scan_track(int i) {
         energy = larger(energy, size_of((Two){ now - before, in_play }));
         fastest = larger(fastest, both(swift));
         back = lesser(back, given);
+        worked = MAX(worked, works[1]);
         before = now;
         old = losses;
     }
@@ -195,7 +197,9 @@ PAIRED static int scan_track(int i) {
         /* A pendulum may have no kinetic energy at its start. */
         L.energy += L.joined ? half * fastest[0] : kinetic(i, first);
         All.lifted += potential(i, last) - potential(i, first);
-        for (int n = 0; n < 3; n++) All.entries[n] += last[6 + n];
+        /* A drive that starts and stops may have done no work at the end. */
+        All.entries[0] += L.mover_count ? worked : last[6];
+        for (int n = 1; n < 3; n++) All.entries[n] += last[6 + n];
     } else {
         L.energy += energy[1];
         All.residual += before - begin;
@@ -402,9 +406,23 @@ static int knot_before(int i, double t) {
     return low;
 }
 
+/* Unexplained energy of a particle at a time between two knots, J, on the cubic of its track. */
+static double unexplained_at(int i, const double *knot, double t) {
+    const double *next = knot + L.row;
+    double now[9], h = next[0] - knot[0], share = h > 0 ? (t - knot[0]) / h : 1;
+    place_at(knot, share, now + 1, now + 2);
+    for (int n = 3; n < 9; n++) now[n] = knot[n] + share * (next[n] - knot[n]);
+    /* The cubic's velocity is that which changes evenly, and a parabola that makes up for the rest of the way. */
+    for (int n = 0; n < 2 && h > 0; n++) {
+        double rest = (next[1 + n] - knot[1 + n]) / h - 0.5 * (knot[3 + n] + next[3 + n]);
+        now[3 + n] += 6 * share * (1 - share) * rest;
+    }
+    return unexplained(i, now);
+}
+
 /* Unexplained energy of all particles together, J: the greatest, over some times, of its lower bound. It isn't recorded
    when a particle got energy from another between its knots, only how much: at any time between two knots it has at least
-   the lesser of the values at both. */
+   the least of the values at both and of that on the track, which may be lower while a joint takes energy. */
 static double risen(void) {
     double found = 0;
     int end = L.offsets[L.particle_count], stride = MAX(1, end / INSTANTS);
@@ -417,7 +435,8 @@ static double risen(void) {
             if (last[0] < t) {
                 sum += unexplained(i, last) - unexplained(i, first);
             } else if (k >= 0) {
-                sum += MIN(unexplained(i, KNOT(k)), unexplained(i, KNOT(k + 1))) - unexplained(i, first);
+                double ends = MIN(unexplained(i, KNOT(k)), unexplained(i, KNOT(k + 1)));
+                sum += MIN(ends, unexplained_at(i, KNOT(k), t)) - unexplained(i, first);
             }
         }
         found = MAX(found, sum);

@@ -74,6 +74,63 @@ def test_a_ball_on_a_shaking_plate_follows_the_map_of_the_bouncing_ball():
         assert row["velocity_after"][1] == pytest.approx(v, abs=1e-8)
 
 
+KINDS = {"disk": {}, "box": {"shape": "box", "size": [2.0 * R, 2.0 * R]}}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("amplitude", "frequency"), [(0.002, 40.0), (0.001, 50.0), (5e-4, 100.0), (5e-5, 1000.0)]
+)
+def test_a_shaking_plate_throws_what_lies_on_it_at_its_own_speed(kind, amplitude, frequency):
+    """It leaves where the plate's acceleration is -g, at A w sqrt(1 - (g / A w²)²)."""
+    w = 2.0 * pi * frequency
+    share = G / (amplitude * w * w)
+    leaves, speed = (pi / 2.0 + np.arcsin(share)) / w, amplitude * w * sqrt(1.0 - share**2)
+    scene = table(
+        shake={"by": [0.0, amplitude], "frequency": frequency, "phase_deg": -90.0},
+        stream={"at": [0.0, R - amplitude]}, run={"until": 0.8 / frequency},
+    )  # fmt: skip
+    scene["particle"] = {"mass": M, **(KINDS[kind] or {"radius": R})}
+    t = 0.55 / frequency
+    v = sound(chutelab.simulate(scene, engine="contact")).at([t]).velocity[0, 0, 1]
+    assert v == pytest.approx(speed - G * (t - leaves), abs=1.2e-4 * speed)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_a_shaking_plate_throws_and_catches_takes_the_work_of_the_map(kind):
+    """Bounces shrink until it lies on the plate, which throws it where its acceleration is -g."""
+    amplitude, frequency, e, drop, until = 0.002, 40.0, 0.3, 0.04, 0.5
+    w = 2.0 * pi * frequency
+    t, y, v, work = 0.0, drop, 0.0, 0.0
+    while t < until:
+
+        def gap(s, t=t, y=y, v=v):
+            return y + v * (s - t) - 0.5 * G * (s - t) ** 2 - amplitude * np.sin(w * s)
+
+        times = t + 1e-9 + np.linspace(0.0, 0.3, 60_001)
+        below = np.argmax(gap(times) < 0.0)
+        at = brentq(gap, times[below - 1], times[below], xtol=1e-15)
+        if at > until:
+            break
+        plate, then = amplitude * w * cos(w * at), v - G * (at - t)
+        work += (1.0 + e) * M * (plate - then) * plate
+        t, y, v = at, amplitude * sin(w * at), plate - e * (then - plate)
+        if e * (plate - then) < 1e-5 and amplitude * w * w * sin(w * t) < G:
+            phase = np.arcsin(G / (amplitude * w * w))
+            leaves = (phase + 2.0 * pi * np.ceil((w * t - phase) / (2.0 * pi))) / w
+            s = np.linspace(t, leaves, 4001)
+            force = M * (G - amplitude * w * w * np.sin(w * s))
+            work += np.trapezoid(force * amplitude * w * np.cos(w * s), s)
+            t, y, v = leaves, amplitude * sin(w * leaves), amplitude * w * cos(w * leaves)
+    scene = table(
+        shake={"by": [0.0, amplitude], "frequency": frequency}, restitution=e,
+        stream={"at": [0.0, R + drop]}, run={"until": until},
+    )  # fmt: skip
+    scene["particle"] = {"mass": M, **(KINDS[kind] or {"radius": R})}
+    recording = sound(chutelab.simulate(scene, engine="contact"))
+    assert np.sum(recording.ledger.drive_work) == pytest.approx(work, rel=1e-2)
+
+
 def test_its_period_doubles_where_the_map_says():
     """A bounce a period is a fixed point of (t, v) -> (t', v'); its multipliers have the product
     e², and one of them is -1 where  A w² sin(phase) = 2 g (1 + e²) / (1 + e)²."""

@@ -310,6 +310,8 @@ void close_step(double h) {
         Disk *d = W.disks + i;
         Track *track = W.tracks + i;
         d->ends = -1;
+        d->lies = d->supports > 0;
+        d->whirl = d->lies ? whirl_of(d) : 0;
         if (d->mode != FREE) continue;
         settle_down(d, h);
         if (!d->supports) {

@@ -83,10 +83,11 @@ static double grown(double least, int impacts, int many, double skip) {
 double left_over(const Disk *d, int impacts, int surface, double radius, int sunk, double t) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
     if (has_corners(d)) {
-        /* A corner in contact comes back as fast as gravity, the rotation and the inside of an arc make it. */
-        double haste = surface >= 0 ? hastes(surface_at(surface, d->t), d) : 0;
+        /* A corner in contact comes back as fast as gravity, the rotation, the surface and the inside of an arc make it. That
+           of a particle in flight arrives: its blow is left only if it is as slow as a fall within a step. */
+        double haste = surface >= 0 && d->lies ? hastes(surface_at(surface, d->t), d) : 0;
         double bends = d->bends > 0 && surface >= 0 && is_held(d, surface) ? d->bends : 0;
-        least = MAX(least, 1.000001 * (W.g + whirl_of(d) + haste + bends) * W.step);
+        least = MAX(least, 1.000001 * (W.g + d->whirl + haste + bends) * W.step);
         sunk = 0;
     } else if (surface >= 0 && (W.interact || d->held_count))
         sunk = gap_to(surface_at(surface, d->t), d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius;
@@ -120,7 +121,7 @@ static double left_between(const Disk *a, const Disk *b, double radius, double g
 
 /* The same for two particles of which one has corners. */
 static double left_by_corners(const Disk *a, const Disk *b, int impacts, double t) {
-    double small = MIN(a->inner, b->inner), back = 1.000001 * (W.g + MAX(whirl_of(a), whirl_of(b))) * W.step;
+    double small = MIN(a->inner, b->inner), back = 1.000001 * (W.g + MAX(a->whirl, b->whirl)) * W.step;
     double least = MAX(MAX(soft_approach(a, small), back), MAX(a->open, b->open));
     if (a->halved || b->halved) least = MAX(least, LEFT_BY_TURNS * W.pace);
     if (!are_few(W.contact_count)) least = MAX(least, left_late(a, b, LATE_CORNERS * small, LATEST * W.soft, t));

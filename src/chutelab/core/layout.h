@@ -119,6 +119,9 @@ typedef struct {
     int corners;            /* [in] number of corners; 0 if it is round ... */
     int outline;            /* [in] ... and the first of them in `World.outlines` */
     int smooth;             /* number, from 1 on, of the step in which its hop was ended */
+    int lies;                   /* whether a lasting contact presses it in this step */
+    double whirl;           /* m/s2; if so, greatest centripetal acceleration of its corners at the beginning of the step,
+                               else 0 */
     double inner, broad;    /* m; radius of the inner circle, and of a circle of its area; or its own */
     double tug[3], tugged[3]; /* m/s, m/s, rad/s; change by half of a step's pull of its joints, now and before */
     double drawn[3];        /* m/s2, m/s2, rad/s2; acceleration by its joints in the latest step that was not brief */
@@ -522,6 +525,7 @@ typedef struct {
     double g;            /* m/s2; size of gravity */
     double tilt;         /* rad; angle of gravity from straight down, counterclockwise */
     double haste;        /* m/s2; bound on the acceleration of surfaces in this step */
+    double shakes;       /* Hz; highest frequency of surfaces that shake in this step, or 0 */
     double fastest;      /* m/s; bound on the speed of all surfaces */
     double pace;         /* sqrt(g / EARTH), 1 without gravity: bounds on speeds are proportional to it, bounds on times
                             inversely. So a film of a run that is played faster is a run, too */

@@ -28,6 +28,12 @@ World W;
    made and removed by a share of WARY. */
 #define OWED 0.01
 #define WARY 0.25
+/* Least number of steps per period of a surface that shakes: with at most FEW_CONTACTS particles so many that it throws
+   what lies on it at its own speed to 1e-4, unless they are shorter than BRIEFEST, s; always so many that no impact is
+   missed. */
+#define FOLLOWED 200
+#define BRIEFEST 5e-6
+#define SEEN 8
 /* Greatest number of knots that an impact writes for a disk. */
 #define KNOTS_EACH 6
 
@@ -377,6 +383,12 @@ static double ledge_in(const Disk *d, double h) {
     return MAX(2 * way * way / d->radius, TOUCHING * d->radius);
 }
 
+/* Longest step, s, in which shaking surfaces are followed. */
+static double shaken_step(void) {
+    double most = 1 / (SEEN * W.shakes);
+    return W.high - W.low > FEW_CONTACTS ? most : MIN(most, MAX(1 / (FOLLOWED * W.shakes), BRIEFEST));
+}
+
 static void set_step(double h) {
     W.step = h;
     W.soft = 2 * W.g * h;
@@ -473,6 +485,7 @@ static int begin_step(void) {
     h = MIN(MIN(share * h, share / W.easiest * whirled), W.dt);
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     if (W.hinges) h = hinge_step(h);
+    if (W.shakes > 0) h = MIN(h, shaken_step());
     W.usual = h;
     set_step(h);
     if (!W.interact) W.ledge = ledge_in(W.disks + W.low, h);

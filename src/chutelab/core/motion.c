@@ -193,10 +193,11 @@ double next_turn(double t) {
 /* Set which surfaces move in the step that begins at t; return whether that has changed. */
 int stir(double t) {
     int changed = 0;
-    W.haste = W.stirs = 0;
+    W.haste = W.shakes = W.stirs = 0;
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
-        int goes_on = m->rate != 0 || (m->frequency > 0 && (m->by[0] != 0 || m->by[1] != 0));
+        int shakes = m->frequency > 0 && (m->by[0] != 0 || m->by[1] != 0), goes_on = m->rate != 0 || shakes;
         int now = m->inertia > 0 || (m->steered ? t < m->until : t >= m->begins && goes_on) || travels(m, t);
+        if (shakes && now) W.shakes = MAX(W.shakes, m->frequency);
         changed |= now != m->stirs;
         W.stirs |= m->stirs = now;
     }

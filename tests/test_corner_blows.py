@@ -1,0 +1,142 @@
+"""Blows on corners have their restitution, however fast a body spins."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+import chutelab
+
+scipy = pytest.importorskip("scipy")
+from scipy.optimize import brentq  # noqa: E402
+
+M, E, MU = 0.01, 0.8, 0.2
+"""kg; restitution and friction of all pairs."""
+
+
+def outline(points, q):
+    """Return the corners of a body at q = (x, y, angle)."""
+    c, s = np.cos(q[2]), np.sin(q[2])
+    return q[:2] + points @ np.array([[c, s], [-s, c]])
+
+
+def first_root(gap, times):
+    """Return when a gap closes for the first time, or None."""
+    values = np.array([gap(t) for t in times])
+    closed = np.flatnonzero((values[:-1] > 0.0) & (values[1:] <= 0.0))
+    return brentq(gap, *times[closed[0] : closed[0] + 2], xtol=1e-16) if len(closed) else None
+
+
+def blows(points, inertia, q, rate, until):
+    """Return the blows on the floor y = 0 without gravity: when, and the velocity after each.
+
+    At a corner at r from the centre, with u = v + omega x r, the impulse is that which gives
+    u_y' = -E u_y and u_x' = 0 or, if friction cannot do that, the one with |J_x| = MU J_y.
+    """
+    found, t0 = [], 0.0
+    while True:
+        times = np.linspace(t0 + 1e-9, until, 4001)
+        t = first_root(
+            lambda t, q=q, v=rate, t0=t0: outline(points, q + v * (t - t0))[:, 1].min(), times
+        )
+        if t is None:
+            return found
+        q, t0 = q + rate * (t - t0), t
+        corners = outline(points, q) - q[:2]
+        x, y = corners[corners[:, 1].argmin()]
+        u = rate[:2] + rate[2] * np.array([-y, x])
+        normal, along, both = 1.0 / M + x * x / inertia, 1.0 / M + y * y / inertia, -x * y / inertia
+        j = np.linalg.solve([[normal, both], [both, along]], [-(1.0 + E) * u[1], -u[0]])
+        if abs(j[1]) > MU * j[0]:
+            way = np.sign(j[1]) * MU
+            j = -(1.0 + E) * u[1] / (normal + way * both) * np.array([1.0, way])
+        rate = rate + np.array([j[1] / M, j[0] / M, (x * j[0] - y * j[1]) / inertia])
+        found.append((t, rate))
+
+
+def square(side):
+    x = 0.5 * side
+    return np.array([(-x, -x), (x, -x), (x, x), (-x, x)]), M * side**2 / 6.0
+
+
+def octagon(radius):
+    """Its moment of inertia is that of eight triangles of height a = R cos(pi / 8)."""
+    angles = np.arange(8) * pi / 4.0
+    points = radius * np.column_stack((np.cos(angles), np.sin(angles)))
+    return points, M * radius**2 * (1.0 + 2.0 * np.cos(pi / 8.0) ** 2) / 6.0
+
+
+@pytest.mark.parametrize(
+    ("shape", "height", "speed", "angle", "omega", "count"),
+    [
+        (square(0.006), 0.1, 2.0, 10.0, 0.0, 2),
+        (octagon(0.03), 0.035, 0.5, 40.0, 400.0, 1),
+        (octagon(0.03), 0.035, 0.2, 10.0, 400.0, 1),
+    ],
+)
+def test_corners_that_spin_down_on_a_floor(shape, height, speed, angle, omega, count):
+    points, inertia = shape
+    scene = {
+        "gravity": 0.0,
+        "particle": {"shape": "polygon", "points": points.tolist(), "mass": M, "spin": True},
+        "surface": [
+            {"name": "floor", "from": [-9.0, 0.0], "to": [9.0, 0.0],
+             "restitution": E, "friction": MU},
+        ],
+        "stream": {
+            "at": [0.0, height], "velocity": [0.0, -speed], "angle_deg": angle, "omega": omega,
+        },
+        "run": {"until": 0.08},
+    }  # fmt: skip
+    recording = chutelab.simulate(scene, engine="contact")
+    assert not recording.laws
+    q, rate = np.array([0.0, height, np.radians(angle)]), np.array([0.0, -speed, omega])
+    wanted, struck = blows(points, inertia, q, rate, 0.08), recording.select("impact")
+    assert len(struck) == len(wanted) == count
+    for row, (t, after) in zip(struck, wanted, strict=True):
+        assert row["t"] == pytest.approx(t, rel=1e-9)
+        assert row["velocity_after"] == pytest.approx(after[:2], rel=1e-7)
+        assert row["omega_after"] == pytest.approx(after[2], rel=1e-7)
+
+
+@pytest.mark.parametrize(("omega", "speed", "angle"), [(400.0, 0.1, 20.0), (200.0, 0.1, 10.0)])
+def test_a_ball_that_comes_to_a_spinning_octagon_is_struck_by_the_first_corner(omega, speed, angle):
+    """The normal is from the place on the octagon to the centre of the ball; u_n' = -E u_n."""
+    points, r = octagon(0.03)[0], 0.01
+
+    def place(t):
+        """Place on the octagon that is nearest to the ball, and the way from it to its centre."""
+        a = outline(points, np.array([0.0, 0.0, np.radians(angle) + omega * t]))
+        b, c = np.roll(a, -1, axis=0) - a, np.array([0.0, 0.045 - speed * t])
+        on = a + np.clip(np.sum((c - a) * b, 1) / np.sum(b * b, 1), 0.0, 1.0)[:, None] * b
+        nearest = on[np.hypot(*(c - on).T).argmin()]
+        return nearest, c - nearest
+
+    kinds = [
+        {"name": "octagon", "shape": "polygon", "points": points.tolist(), "mass": 0.1},
+        {"name": "ball", "radius": r, "mass": 0.02},
+    ]
+    pair = {"restitution": E, "friction": MU}
+    scene = {
+        "gravity": 0.0,
+        "particle": [{**kind, "spin": True} for kind in kinds],
+        "surface": [{"name": "far", "from": [-9.0, -9.0], "to": [9.0, -9.0]}],
+        "stream": [
+            {"particle": "octagon", "at": [0.0, 0.0], "velocity": [0.0, 0.0], "omega": omega,
+             "angle_deg": angle, "interact": True, **pair},
+            {"particle": "ball", "at": [0.0, 0.045], "velocity": [0.0, -speed], **pair},
+        ],
+        "run": {"until": 0.1},
+    }  # fmt: skip
+    recording = chutelab.simulate(scene, engine="contact")
+    struck = recording.select("collision")[0]
+    t = first_root(lambda t: np.hypot(*place(t)[1]) - r, np.linspace(0.0, 0.1, 4001))
+    at, way = place(t)
+    n = way / r
+    now = recording.at([t + 1e-9])
+    v, spin = now.velocity[0], now.omega[0]
+    on_ball, on_octagon = np.array([way[1], -way[0]]), np.array([-at[1], at[0]])
+    after = v[1] + spin[1] * on_ball - v[0] - spin[0] * on_octagon
+    before = np.array([0.0, -speed]) - omega * on_octagon
+    assert struck["t"] == pytest.approx(t, rel=1e-7)
+    assert after @ n == pytest.approx(-E * (before @ n), rel=1e-6)

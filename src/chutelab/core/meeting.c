@@ -253,13 +253,15 @@ double meet_corners(int i, int j, double from, double until, double most, double
             Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
             if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
         }
-        /* A tip that passes through a tip within a stride is inside nothing after it, but edges cross then. */
-        if (!clear || first < INFINITY || most * (t - last) < near) continue;
-        a2 = shape_of(i, t);
-        b2 = shape_of(j, t);
-        clear = are_apart(&a2, &b2, 0);
+        /* A tip that passes through a tip within a stride is inside nothing after it, but edges cross then, also before
+           a corner enters. */
+        if (!clear || most * (t - last) < near) continue;
+        double end = MIN(t, first);
+        a2 = shape_of(i, end);
+        b2 = shape_of(j, end);
+        clear = are_apart(&a2, &b2, first < INFINITY ? -TOUCHING * small : 0);
         if (clear) continue;
-        double then = overlap_at(i, j, last, t);
+        double then = overlap_at(i, j, last, end);
         Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
         if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
     }

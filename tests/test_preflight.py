@@ -481,6 +481,25 @@ def test_a_density_that_no_solid_has_is_noticed():
     assert "less than any solid" in said("particle.mass=1e-5")[0]
 
 
+@pytest.mark.parametrize(("start", "length", "told"), [
+    (0.07, None, True), (0.0, None, False), (0.07, 0.1, False),
+])  # fmt: skip
+def test_a_string_to_a_particle_that_comes_later_is_told(start, length, told):
+    """At 1 m/s the first is 0.07 m away by then, of a string of 0.03 m."""
+    row = {"interact": True, "velocity": [0.0, 0.0]}
+    tables = {
+        "gravity": 0.0,
+        "surface": [{"name": "far", "from": [-1.0, -1.0], "to": [1.0, -1.0]}],
+        "stream": [row | {"at": [0.0, 0.0], "velocity": [1.0, 0.0]},
+                   row | {"at": [0.03, 0.0], "start": start}],
+        "string": [{"particle": 0, "other": 1} | ({"length": length} if length else {})],
+        "run": {"until": 0.2},
+    }  # fmt: skip
+    said = [one.warning for one in preflight(sc.from_dict(tables)).advice]
+    waits = [one for one in said if "particle 1 is released 0.07 s after particle 0" in one]
+    assert len(waits) == told
+
+
 def test_a_release_between_the_sides_of_a_conveyor_is_warned_of():
     belt = {"name": "belt", "from": [1.0, 0.0], "to": [3.0, 0.0], "pulley_radius": 0.2, "speed": 1}
     for y, said in ((0.0, 1), (0.3, 0)):

@@ -119,7 +119,7 @@ typedef struct {
     int corners;            /* [in] number of corners; 0 if it is round ... */
     int outline;            /* [in] ... and the first of them in `World.outlines` */
     int smooth;             /* number, from 1 on, of the step in which its hop was ended */
-    int lies;                   /* whether a lasting contact presses it in this step */
+    int lies;               /* whether a lasting contact presses it in this step */
     double whirl;           /* m/s2; if so, greatest centripetal acceleration of its corners at the beginning of the step,
                                else 0 */
     double inner, broad;    /* m; radius of the inner circle, and of a circle of its area; or its own */

@@ -119,8 +119,28 @@ def places(scene: Scene, machine: Machine) -> Iterator[Advice]:
                 {},
             )
     yield from _beyond_walls(scene, machine)
+    yield from _joined_later(scene, machine)
     if machine.interact:
         yield from _narrow(scene, machine)
+
+
+def _joined_later(scene: Scene, machine: Machine) -> Iterator[Advice]:
+    """Warn of joints without a length between particles that are released at different times."""
+    for table, joint in scene.joints:
+        if joint.other is None or getattr(joint, "length", 0.0) is not None:
+            continue
+        first, last = sorted((joint.particle, joint.other), key=machine.releases.t.__getitem__)
+        wait = float(machine.releases.t[last] - machine.releases.t[first])
+        if not wait > 0.0:
+            continue
+        path = f"{table}[{getattr(scene, table).index(joint)}]"
+        yield Advice(
+            f"{path}: particle {last} is released {wait:.4g} s after particle {first}, and without"
+            f" a length the {table} is as long as these two places are apart: it pulls at once if"
+            " the first one has moved away",
+            f"{path}.length, or releases at one time",
+            {},
+        )
 
 
 def _narrow(scene: Scene, machine: Machine) -> Iterator[Advice]:

@@ -65,18 +65,18 @@ def test_both_bars_are_equally_long_at_any_time(runs, name):
 
 @pytest.mark.parametrize("tilt", [0.0, 20.0])
 def test_heights_count_from_the_machines_lowest_point(tilt):
-    """m g h from where neither surface nor release is lower, at all times: h = y cos θ - x sin θ.
+    """m g h from where it would lie at the lowest place, at all times: h = y cos θ - x sin θ.
 
-    What falls beside the floor leaves 1 m below it, with -m g 1 m.
+    What falls beside the floor leaves 1 m below it, with -m g (1 m + r).
     """
-    mass, g, (x, y), (right, low) = 0.1, 9.81, (0.0, 0.3), (6.0, -0.2)
+    mass, r, g, (x, y), (right, low) = 0.1, 0.02, 9.81, (0.0, 0.3), (6.0, -0.2)
     [answer] = ask(scenes=[page_scene(from_dict({
-        "particle": {"radius": 0.02, "mass": mass}, "gravity_deg": tilt,
+        "particle": {"radius": r, "mass": mass}, "gravity_deg": tilt,
         "stream": {"at": [x, y], "velocity": [0.0, 0.0]},
         "surface": [{"name": "floor", "points": [[5.0, low], [right, low]]}],
     }))[0]])["runs"]  # fmt: skip
     cos, sin = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
-    start = mass * g * ((y * cos - x * sin) - (low * cos - right * sin))
+    start = mass * g * ((y * cos - x * sin) - (low * cos - right * sin) - r)
     ledgers = answer["ledgers"][:400]
     assert [at["start"] for at in ledgers] == pytest.approx([start] * 400, rel=1e-12)
     kinetic, potential = (
@@ -85,7 +85,7 @@ def test_heights_count_from_the_machines_lowest_point(tilt):
     assert np.abs(kinetic + potential - start).max() < 1e-12 * start
     assert [at["potential"] for at in answer["samples"]][-1] == potential[-1]
     if not tilt:
-        assert potential[-1] == pytest.approx(-mass * g, rel=1e-12)
+        assert potential[-1] == pytest.approx(-mass * g * (1.0 + r), rel=1e-12)
         # It has given more than there was at the release, and stands on that side.
         assert dict(ledgers[-1]["putIn"])["potential"] == -potential[-1]
 

@@ -25,9 +25,9 @@ Laws L;
 #define DEEP 0.03
 #define OPENS 1e-2
 #define GIVES 3e-3
+#define FALL 8e-3
 /* Share of the energy in play that losses of a crowd may give back in a run. */
 #define HELD 1e-2
-#define FALL 8e-3
 /* m/s on Earth; changes of velocity that a track of the contact engine in a crowd may leave out. */
 #define SMOOTH 1e-4
 #define EARTH 9.81

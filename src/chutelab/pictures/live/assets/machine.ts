@@ -63,7 +63,7 @@ export interface Machine {
   gravity: number;
   tilt: number; // rad; angle of gravity from straight down
   up: [number, number]; // against gravity
-  ground: number; // m; lowest height of surfaces, releases, and what moves or hangs
+  ground: number; // m; height from which others count, see `groundOf`
   air: number; // kg/m³, density of still air; 0 without
   landing: number; // index of the outgoing belt, -1 without one
   until: "landed" | "settled" | "time";
@@ -132,7 +132,8 @@ export function build(scene: Scene): Machine {
   const pairs = every.map((a) => every.map((b) => met(scene, a, b)));
   // Boxes all run at once, even if they do not interact.
   const outlines = particles.map(({ outline }) => outline);
-  const isAlone = !scene.crowded && outlines.some(({ length }) => length);
+  const isAngular = outlines.some(({ length }) => length > 0);
+  const isAlone = !scene.crowded && isAngular;
   const pace = scene.gravity > 0 ? Math.sqrt(scene.gravity / EARTH) : 1;
   const isHung = scene.joints.length > 0 || laid.movers.some(({ inertia }) => inertia > 0);
   const isChosen = scene.crowded && scene.count >= MANY && !isHung && !run.is_told;
@@ -141,7 +142,7 @@ export function build(scene: Scene): Machine {
     gravity: scene.gravity,
     tilt,
     up,
-    ground: groundOf(releases, up),
+    ground: groundOf(releases, isAngular ? [0] : radius, up),
     air: scene.air_density,
     landing: names.indexOf("outgoing"),
     until: typeof run.until === "string" ? run.until : "time",
@@ -174,14 +175,17 @@ export function build(scene: Scene): Machine {
   });
 }
 
-/** Returns the lowest height that is still in the scene, m: only what leaves it comes lower. Boxes
- * have no ends on sides to which gravity does not pull. */
-function groundOf(releases: Release[], up: [number, number]) {
+/** Returns the height, m, at which the smallest particle lies at the lowest place that is still in
+ * the scene, or is released, if that is lower. Boxes have no ends on sides to which gravity does
+ * not pull. */
+function groundOf(releases: Release[], radius: number[], up: [number, number]) {
   const { EXIT_MARGIN: margin } = memory().layout.constants;
-  return releases.reduce((ground, { exitBox }) => Math.min(ground, up.reduce((height, share, n) => {
-    const end = share > 0 ? exitBox[n] + margin : exitBox[n + 2] - margin;
-    return isFinite(end) ? height + share * end : height;
-  }, 0)), Infinity);
+  const least = radius.reduce((one, other) => Math.min(one, other));
+  return releases.reduce((ground, { x, y, exitBox }) => Math.min(ground, up[0] * x + up[1] * y,
+    up.reduce((height, share, n) => {
+      const end = share > 0 ? exitBox[n] + margin : exitBox[n + 2] - margin;
+      return isFinite(end) ? height + share * end : height;
+    }, least)), Infinity);
 }
 
 /** Restitution that marks two kinds that pass through each other. */

@@ -13,6 +13,7 @@ import chutelab
 from chutelab.engines.simulation import judged
 from chutelab.machine import build
 from chutelab.results.laws import INSIDE, judge
+from chutelab.results.quantities import measure
 from chutelab.scene import SceneError, from_dict
 from cores import Core
 from machines import in_a_box
@@ -320,6 +321,20 @@ def test_the_work_of_drives_is_energy_and_losses_in_a_crowd(scene):
     if "speed" not in scene["surface"][0]:
         assert ledger.belt_work == pytest.approx(0.0, abs=1e-12)
     assert ledger.drive_work > 0.0
+
+
+@pytest.mark.parametrize("shape", [{"radius": R}, {"shape": "box", "size": [2 * R, 2 * R]}])
+def test_what_a_drive_gives_and_takes_back_is_turned_over(shape):
+    """A floor that travels by d in T is fastest in the middle, 2 d / T; at both ends all rests."""
+    particle, travel = {**shape, "mass": M, "spin": "size" in shape}, {"to": [-0.1, 0.0], "in": 0.5}
+    scene = table(friction=0.9, restitution=0.0, travel=travel, run={"until": 0.7})
+    recording = sound(chutelab.simulate(scene | {"particle": particle}, engine="contact"))
+    most, ledger = 0.5 * M * (2.0 * 0.4 / 0.5) ** 2, recording.ledger
+    # The track has the middles of steps.
+    assert ledger.turned_over == pytest.approx(most, rel=0.03)
+    assert measure(recording, "ledger.turned_over") == ledger.turned_over
+    assert abs(ledger.belt_work + ledger.drive_work) < 1e-12 * most
+    assert ledger.relative_residual < 1e-13
 
 
 def test_what_sleeps_wakes_when_its_floor_begins_to_travel():

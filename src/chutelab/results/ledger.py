@@ -63,7 +63,7 @@ class Ledger(Shown):
         Remainder of the balance: the numerical error.
     turned_over : float
         Kinetic energy at the start + the sizes of the three entries + the size of the change of
-        potential energy.
+        potential energy. Where surfaces move, the greatest belt work on each particle's way counts.
     by_surface : dict of dict of float
         The three entries of each surface, of ``"particles"``, and with air of ``"still air"``;
         where surfaces move also ``drive_work``.
@@ -150,6 +150,19 @@ def ledger_of_each(recording: Record) -> dict[str, Floats]:
     }  # fmt: skip
 
 
+def worked(recording: Record) -> Floats:
+    """Return the size of the belt work of each released particle, (n,), J.
+
+    Where surfaces move, the greatest on its way: a drive that starts and stops takes back what it
+    gave.
+    """
+    work: Floats = np.abs(recording.knots["entries"][:, 0])
+    first, end = recording.offsets[:-1][recording.released], recording.offsets[1:]
+    if recording.machine.movers and len(work):
+        return np.asarray(np.maximum.reduceat(work, first))
+    return work[end[recording.released] - 1]
+
+
 @kept
 def ledger_of_variants(recording: Record) -> dict[str, Floats]:
     """Return the ledger of each scene of a family, (V,), J; names as in the registry."""
@@ -183,6 +196,8 @@ def ledger(recording: Record) -> Ledger:
     if recording.scene.air_density:
         by_surface[AIR] = dict(zip(ENTRIES, (0.0, 0.0, recording.air_loss), strict=True))
     closed, work = _closed(found), float(recording.drives.sum())
+    if recording.machine.movers:
+        closed["turned_over"] += float(worked(recording).sum()) - abs(closed["belt_work"])
     closed["belt_work"] -= work
     pushed = by_surface[PARTICLES]["belt_work"]
     if len(springs := recording.springs):

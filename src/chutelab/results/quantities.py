@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.results.arrival import arrivals, firsts, never
-from chutelab.results.ledger import ledger, ledger_of_each, ledger_of_variants
+from chutelab.results.ledger import ledger, ledger_of_each, ledger_of_variants, worked
 from chutelab.results.loads import load
 from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
 from chutelab.results.sensors import first_passages, reading
@@ -374,7 +374,10 @@ def each(recording: Record, name: str) -> Floats:
             entries, fall = found["entries"], found["potential.end"] - found["potential.start"]
             found |= dict(zip(ENTRIES, entries.T, strict=True))
             found["turned_over"] = (
-                found["kinetic.start"] + np.abs(entries).sum(axis=1) + np.abs(fall)
+                found["kinetic.start"]
+                + worked(recording)
+                + np.abs(entries[:, 1:]).sum(axis=1)
+                + np.abs(fall)
             )
             return _at_end(recording, found[entry])
         case ["flight", "t"]:

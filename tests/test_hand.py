@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import chutelab
+import sandbox
 from chutelab.results import Recording
 from chutelab.results.recorder import StalledError
 from chutelab.scene import SceneError
 from chutelab.util.errors import InputError
+from shared import seeds
 
 G, R, M, MU = 9.81, 0.02, 0.1, 0.3
 
@@ -121,6 +123,76 @@ def test_pushes_of_a_crowd_close_the_ledger(air):
             run.push(particle, 0.1 * draw.normal(size=2))
         run.step(0.01)
     assert closes(run.recording).push_work > 0.1
+
+
+@pytest.mark.parametrize("kind", ["rod", "string", "spring"])
+def test_a_push_along_a_floor_takes_along_what_is_tied_to_it(kind):
+    """2 m a = F_x - mu N with N = 2 m g - F_y, which never stops pressing; work F_x s."""
+    push, span, away = (0.9, 0.2), 0.4, 0.2
+    stream = [{"at": [x, R], "velocity": [0.0, 0.0], "interact": True} for x in (0.0, away)]
+    joint = {"particle": 0, "other": 1, **({"stiffness": 1e4} if kind == "spring" else {})}
+    run = chutelab.start({**scene(surface=[FLOOR], **{kind: [joint]}), "stream": stream})
+    run.step(0.05)
+    pressed = []
+    for _ in range(40):
+        run.push(1, push)
+        run.step(span / 40)
+        pressed.append(sum(touch.pressed for touch in run.contacts))
+    normal = 2.0 * M * G - push[1]
+    assert pressed == pytest.approx(np.full(40, normal), rel=1e-2)
+    pace = (push[0] - MU * normal) / (2.0 * M) * span
+    assert run.velocities[:, 0].mean() == pytest.approx(pace, rel=1e-2)
+    run.step(1.0)
+    assert closes(run.recording).push_work == pytest.approx(push[0] * 0.5 * pace * span, rel=2e-2)
+
+
+def test_a_push_is_force_times_time_although_impacts_cut_the_steps_of_joints():
+    """Smooth walls give nothing along them: m1 v1 + m2 v2 = F t."""
+    push = 0.3
+    walls = [
+        {
+            **FLOOR,
+            "name": f"wall{n}",
+            "from": [x, -9.0 * side],
+            "to": [x, 9.0 * side],
+            "friction": 0.0,
+            "restitution": 0.9,
+        }
+        for n, x, side in ((0, -0.2, -1), (1, 0.2, 1))
+    ]
+    stream = [
+        {"at": [x, y], "velocity": [3.0, 0.0], "interact": True}
+        for x, y in ((-0.1, 0.0), (0.0, 0.1))
+    ]
+    tied = scene(surface=walls, gravity=0.0, rod=[{"particle": 0, "other": 1}])
+    run = chutelab.start({**tied, "stream": stream})
+    run.step(0.01)
+    begin = run.t
+    while not run.done:
+        run.push(1, (0.0, push))
+        run.step(0.0137)
+        given = M * run.velocities[:, 1].sum()
+        assert given == pytest.approx(push * (run.t - begin), rel=1e-9) or run.done
+    assert len(run.recording.select("impact")) > 5
+    closes(run.recording)
+
+
+@pytest.mark.parametrize("seed", seeds(30, 300))
+def test_pushes_of_random_machines_close_the_ledger(seed):
+    """Crowds with belts and gates, or bodies with joints on what moves; particles and hinges."""
+    random = np.random.default_rng(seed)
+    drawn = sandbox.bodies(seed, both=seed % 3 == 2) if seed % 3 else sandbox.draw(seed)
+    run = chutelab.start(drawn)
+    hung = [name for name, mover in run.scene.movers.items() if mover.hinge]
+    while not run.done:
+        for _ in range(random.integers(3)):
+            force = 10.0 ** random.uniform(-3.0, -0.5) * random.normal(size=2)
+            if hung and random.random() < 0.5:
+                run.push(str(random.choice(hung)), force, at=random.normal(size=2))
+            else:
+                run.push(int(random.integers(len(run.positions))), force)
+        run.step(10.0 ** random.uniform(-4.0, -1.0))
+    closes(run.recording)
 
 
 def test_what_hangs_is_pushed_by_a_torque_whose_work_is_torque_times_angle():

@@ -245,11 +245,10 @@ void close_step(double h) {
             d->rest += is_tied(i) ? 0 : h;
             d->anchor[2] += h * d->radius * d->spin;
         }
-        if (W.pushes && (d->kick[0] != 0 || d->kick[1] != 0)) {
+        if (W.hastened > 0 && (d->kick[0] != 0 || d->kick[1] != 0)) {
             d->calm = d->rest = 0;
-            d->ahead[0] = pushed(d, W.before);
-            book(d->gain, 0, W.owner_count, (double[]){pushed(d, 0), 0, 0});
-            W.push_work += pushed(d, 0);
+            d->ahead[0] = pushed(d, share_before(d));
+            book_push(d->gain, pushed(d, 0));
         }
     }
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
@@ -405,10 +404,7 @@ void unload(int i, const int *up) {
 /* Take back what the second half of this step's impulses did to the ledger for disk i. */
 void take_back(int i) {
     Disk *d = W.disks + i;
-    double given = W.pushes ? pushed(d, W.before) : 0;
-    d->entries[0] -= given;
-    W.books[3 * W.owner_count] -= given;
-    W.push_work -= given;
+    if (W.hastened > 0) book_push(d->entries, -pushed(d, share_before(d)));
     for (int link = d->links; link >= 0; link = W.links[link]) {
         const Contact *c = W.contacts + link / 2;
         if (c->halved) continue;
@@ -432,7 +428,7 @@ void take_back(int i) {
 void end_in_contact(int i, int reason) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    const double *s = track->held, f = d->halved ? 0 : W.before;
+    const double *s = track->held, f = share_before(d);
     if (d->held_count)
         /* Inside an arc it is faster than its impulses make it, see `track_lasting`. */
         bear_disk(d, W.surfaces[d->held[0]].owner, d->mass * (s[3] - d->ux - f * (d->vx - d->ux)),

@@ -188,6 +188,8 @@ static inline double driven(const Contact *c, double f) {
 static inline double past_of(const Contact *c) {
     return c->halved || !W.tracks[c->i].lasted ? 0 : 0.5 * W.length_before;
 }
+/* Share of this step's impulses on a disk that belongs to the step before. */
+static inline double share_before(const Disk *d) { return d->halved ? 0 : W.before; }
 /* Whether a particle has joints. */
 static inline int is_tied(int i) { return i >= 0 && W.disks[i].tie >= 0; }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
@@ -288,8 +290,9 @@ int set_hinge_rows(SolverRow *rows, int body);
 void take_hinge_rows(const SolverRow *rows, int count, int body);
 
 /* hand.c */
-void kick_disks(double h);
+void kick(Disk *d, double time);
 double pushed(const Disk *d, double f);
+void book_push(double *entries, double work);
 double steered_to(const Mover *m, double t);
 
 /* joints.c */

@@ -1,8 +1,9 @@
 /* What a user does by hand between two steps: push disks and turn plates.
 
-   A push is a force. Once a step it gives an impulse for half of the step before and half of this one, together with the
-   impulses of the contacts: so it is of second order, and its work is that impulse times the mean of the velocities
-   before and after all impulses. A plate turns at a constant rate until a given time, at which a step ends. */
+   A push is a force. Once a step it gives what it owes from the step before and its impulse for half of this one, together
+   with the impulses of the contacts: so it is of second order, and its work is that impulse times the mean of the
+   velocities before and after all impulses. To a disk in a halved contact it gives what it owes at the end of the step,
+   see tied.c. A plate turns at a constant rate until a given time, at which a step ends. */
 
 #include "core.h"
 
@@ -10,29 +11,34 @@
    incoming belt carries by adhesion is not moved. */
 EXPORT void push_disk(int i, double x, double y) {
     Disk *d = W.disks + i;
-    W.pushes |= x != 0 || y != 0;
+    W.hastened = MAX(W.hastened, d->inv_mass * hypot(x, y));
     d->stirred |= d->mode == ASLEEP;
     d->force[0] = x;
     d->force[1] = y;
 }
 
-/* Apply the impulses of pushes to disks, for a step of length h. */
-void kick_disks(double h) {
-    for (int i = W.low; i < W.high; i++) {
-        Disk *d = W.disks + i;
-        for (int n = 0; n < 2; n++) {
-            int free = d->mode == FREE;
-            d->kick[n] = free ? 0.5 * d->inv_mass * (W.length_before * d->pushed[n] + h * d->force[n]) : 0;
-            d->pushed[n] = free ? d->force[n] : 0;
-            (&d->vx)[n] += d->kick[n];
-        }
+/* Give a disk what a push owes and its impulse for a time to come. */
+void kick(Disk *d, double time) {
+    for (int n = 0; n < 2; n++) {
+        double ahead = d->mode == FREE ? time * d->force[n] : 0;
+        d->kick[n] = d->mode == FREE ? d->inv_mass * (d->owed[n] + ahead) : 0;
+        d->owed[n] = -ahead;
+        (&d->vx)[n] += d->kick[n];
     }
 }
 
 /* Work of the push of a step on a disk after the share f of its impulse has been given, J. */
 double pushed(const Disk *d, double f) {
-    double before = d->kick[0] * d->ux + d->kick[1] * d->uy, after = d->kick[0] * d->vx + d->kick[1] * d->vy;
+    /* The velocity after the impulses of halved contacts includes the pull of joints, which is booked as if it came later. */
+    double x = d->vx - d->halved * d->tug[0], y = d->vy - d->halved * d->tug[1];
+    double before = d->kick[0] * d->ux + d->kick[1] * d->uy, after = d->kick[0] * x + d->kick[1] * y;
     return 0.5 * d->mass * ((1 - f) * (1 - f) * before + (1 - f * f) * after);
+}
+
+/* Book a part of the work of a push. */
+void book_push(double *entries, double work) {
+    book(entries, 0, W.owner_count, (double[]){work, 0, 0});
+    W.push_work += work;
 }
 
 /* Turn a plate that has no motion of its own to an angle relative to its written position, at a constant rate until a

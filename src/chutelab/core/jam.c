@@ -93,6 +93,7 @@ void jam(Contact *struck, double t) {
         a->ux = a->vx;
         a->uy = a->vy;
         a->uspin = a->spin;
+        a->kick[0] = a->kick[1] = 0;
         if (reached++ >= JAMMED) continue;
         found = reachable(m);
         a->jam = -W.jams;

@@ -661,7 +661,8 @@ static void find_track(int i) {
 /* Prepare to read tracks: find what the machine alone tells. */
 static void begin_judging(void) {
     L.breach_count = L.hit_count = 0;
-    L.energy = L.haste = 0;
+    L.energy = 0;
+    L.haste = L.hastened;
     memset(&All, 0, sizeof All);
     shape_barriers();
     scan_machine();

@@ -87,8 +87,9 @@ typedef struct {
     double bends;               /* m/s2; greatest acceleration by which arcs turn the paths of its corners: see `bends_by` */
     double lacks;               /* J; kinetic energy missing in the mean velocity of this step's impulses inside an arc,
                                    see `account` */
-    double force[2], pushed[2]; /* N; push by hand, in this step and in the one before ... */
-    double kick[2];             /* m/s; ... and the change of velocity by it in this step */
+    double force[2];            /* N; push by hand */
+    double owed[2];             /* N s; impulse that it has still to give, below 0 if it gave more than for the time so far */
+    double kick[2];             /* m/s; change of velocity by it in this step */
     double turned;              /* [in] rad; angle from its written position */
     int kind;                   /* [in] row of the table of pairs */
     int rides;                  /* [in] the incoming belt carries it by adhesion */
@@ -462,7 +463,6 @@ typedef struct {
     /* the run */
     int interact;        /* disks collide with each other */
     int is_whole;        /* [in] all knots and events are still here: the host has taken none */
-    int pushes;          /* something has been pushed by hand */
     int until;
     int landing;         /* owner on which a disk lands, or -1 */
     int ride_owner;      /* owner that rides are on */
@@ -494,6 +494,7 @@ typedef struct {
     double released;     /* J; energy of disks at their releases */
     double ended[5];     /* J; of disks of a crowd at their ends: kinetic, potential, entries */
     double push_work;    /* J; work of pushes by hand */
+    double hastened;     /* m/s2; greatest acceleration of a disk by such a push */
     double gained;       /* J; by which solves broke their law of energy, see `check_solve` */
     double unsolved;     /* radii; greatest overlap that the solve of this step leaves beyond what it asks for */
     double unsolved_most; /* ... and that of all steps so far */
@@ -902,6 +903,7 @@ typedef struct {
     double tilt;            /* [in] rad; angle of gravity from straight down */
     double dt;              /* [in] s; step, 0 for the exact engine */
     double gained;          /* [in] J; by which solves broke their law of energy */
+    double hastened;        /* [in] m/s2; greatest acceleration of a particle by a push by hand */
     double regained;        /* [in] J; greatest fall of the losses of all below their maxima before, both together */
     double unsolved;        /* [in] radii; greatest overlap that the solve of a step left beyond what it asked for */
     double unit;            /* [in] J; unit of the entries of a crowd from a file, 0: they have all bits */
@@ -916,7 +918,7 @@ typedef struct {
     double rounding;        /* m; greatest rounding of a length */
     double arcs;            /* m; by which a curve between two knots may leave an arc */
     double bent;            /* m/s2; greatest acceleration along the inside of an arc */
-    double haste;           /* m/s2; greatest acceleration of a moving surface */
+    double haste;           /* m/s2; greatest acceleration by a push or of a moving surface */
     double late;            /* m; by which a step may take a disk beyond a surface */
     double allowed;         /* m; how deep a disk may be in a surface */
     double energy;          /* J; in play, see `energy_share` */

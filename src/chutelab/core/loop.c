@@ -179,6 +179,8 @@ static void take_off(int i) {
     d->mode = FREE;
     d->changes++;
     d->aired = d->t;
+    /* A push acts on it from now on. */
+    for (int n = 0; n < 2; n++) d->owed[n] = (W.t - d->t) * d->force[n];
     slow_down(i, 0.5 * (d->t + MAX(W.step_end, d->t)));
     d->ux = d->vx;
     d->uy = d->vy;
@@ -223,7 +225,6 @@ static int release(int i, double t) {
         for (int k = 0; k < W.surface_count && W.gate_count; k++)
             if (W.surfaces[k].one_sided) spare(d, W.surfaces + k, t);
         lie_down(i);
-        for (int n = 0; n < 2 && W.pushes; n++) d->pushed[n] = 2 * (W.step_end - t) / W.length * d->force[n];
     }
     return 1;
 }
@@ -562,7 +563,7 @@ static int begin_step(void) {
     } while (woke);
     W.length = h;
     if (W.interact) judge_overlaps();
-    if (W.pushes) kick_disks(h);
+    for (int i = W.low; W.hastened > 0 && i < W.high; i++) kick(W.disks + i, 0.5 * h);
     if (W.hinges) begin_hinges(W.t, h);
     W.swings_too = W.step_jams = 0;
     W.unsolved = 0;
@@ -691,6 +692,7 @@ static void end_step(void) {
         if (d->mode != RIDING && !is_tied(i)) leave(i, W.step_end);
         if (d->mode == FREE) {
             advance(d, W.step_end);
+            for (int n = 0; n < 2; n++) d->owed[n] += (W.step_end - W.t) * d->force[n];
             if (d->tie < 0) slow_down(i, W.step_end);
         }
         else if (d->mode == ASLEEP) {

@@ -158,7 +158,7 @@ void flush_track(int i) {
 void track_lasting(int i) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    double f = d->halved ? 0 : W.before;
+    double f = share_before(d);
     double state[6] = {d->t, d->x, d->y, d->ux + f * (d->vx - d->ux), d->uy + f * (d->vy - d->uy),
                        d->uspin + f * (d->spin - d->uspin)};
     double entries[3];

@@ -149,7 +149,7 @@ void set_rows(Contact *list, int count) {
             r->light[k] = 1 / c->mass[k];
             r->impulse[k] = c->impulse[k];
         }
-        if (W.pushes) {
+        if (W.hastened > 0) {
             const Disk *a = W.disks + c->i, *b = W.disks + c->j;
             double x = a->kick[0] - (c->two ? b->kick[0] : 0), y = a->kick[1] - (c->two ? b->kick[1] : 0);
             r->free[0] += x * c->nx + y * c->ny;

@@ -47,7 +47,7 @@ void agree_with_contacts(double h) {
         solve_contacts(1);
     }
     /* A push by hand changes the pull, too. */
-    if (meets || W.pushes) pull_joints(h);
+    if (meets || W.hastened > 0) pull_joints(h);
 }
 
 /* Mark the particles that a halved contact presses; those that only touch go on like others with joints. */
@@ -155,6 +155,10 @@ void press_again(double h) {
         relative(list + n, 0, u);
         list[n].need = -u[0];
     }
+    for (int n = 0; W.hastened > 0 && n < 2 * count; n++) {
+        Disk *d = W.disks + felt_by(list, n);
+        if (d >= W.disks && (d->owed[0] != 0 || d->owed[1] != 0)) kick(d, 0);
+    }
     W.swings_too = 0;
     for (int n = 0, to = 0; n < count; n = to) {
         double least = INFINITY;
@@ -170,7 +174,10 @@ void press_again(double h) {
     for (int n = 0; n < 2 * count; n++) {
         int i = felt_by(list, n);
         if (i < 0) continue;
-        W.disks[i].changes++;
+        Disk *d = W.disks + i;
+        d->changes++;
+        if (W.hastened > 0) book_push(d->entries, pushed(d, 0));
+        d->kick[0] = d->kick[1] = 0;
         track_ended(i);
     }
 }
@@ -182,8 +189,18 @@ int has_halves(void) {
     return 0;
 }
 
+/* Add (`way` 1) or subtract (-1) the part of the work of pushes that depends on the impulses of halved contacts. */
+static void book_pushes_again(int way) {
+    for (EACH_LIVE(i)) {
+        Disk *d = W.disks + i;
+        double along = d->kick[0] * (d->vx - d->tug[0]) + d->kick[1] * (d->vy - d->tug[1]);
+        if (d->halved && along != 0) book_push(d->entries, way * 0.5 * d->mass * along);
+    }
+}
+
 /* Take back the first halves and the pull; the step is solved anew. */
 void take_halves_back(void) {
+    if (W.hastened > 0) book_pushes_again(-1);
     for (Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
         double back[3] = {-c->impulse[0], -c->impulse[1], -c->impulse[2]};
         if (!c->halved) continue;
@@ -191,6 +208,7 @@ void take_halves_back(void) {
         c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     }
     drop_tugs();
+    if (W.hastened > 0) book_pushes_again(1);
     for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         if (d->halved) memcpy(W.tracks[i].after, &d->vx, sizeof W.tracks[i].after);

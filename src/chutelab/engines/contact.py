@@ -315,6 +315,7 @@ class Job:
             recorder.triggered = triggers["t"].copy()
         recorder.contacts = world.impact_count
         recorder.gained, recorder.air_loss = world.gained, world.air_loss
+        recorder.hastened = world.hastened
         if world.total_count:
             recorder.take_totals(module.array("totals", dtype("Total"), world.total_count))
         recorder.impulses = gather(module, self.owners)

@@ -234,8 +234,8 @@ class Run:
         found = []
         for n, name in enumerate("xy"):
             pull, v = (world.gx, world.gy)[n], disks[f"v{name}"]
-            # The second half of a push's impulse in the last step is still to come.
-            late = 0.5 * world.length * light * disks["pushed"][:, n]
+            # A push still owes the second half of its impulse in the last step.
+            late = light * disks["owed"][:, n]
             found.append(np.where(on, disks[name] + (v + 0.5 * pull * h) * h, np.nan))
             found.append(np.where(on, v + pull * fell + late, np.nan))
         x, vx, y, vy = found
@@ -252,8 +252,9 @@ class Run:
         module, names = self._module, self._machine.surfaces
         world, found = module.world, list[Touch]()
         rows = module.array("earlier", dtype("Contact"), world.earlier_count)
-        span = 0.5 * (world.length_before + world.length)
         for row in rows[rows["impulse"][:, 0] > 0.0]:
+            # Half of the impulse of a halved contact comes at the end of a step.
+            span = 0.5 * (world.length if row["halved"] else world.length_before + world.length)
             pressed, rubbed, _ = (row["impulse"] / span).tolist()
             i, j, normal = (
                 int(row["i"]),

@@ -289,6 +289,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
     laws.each, laws.pulley = rows.ndim > 1, machine.pulley is not None
     laws.contacts, laws.steps = recording.contacts, recording.steps
     laws.unreal, laws.gained, laws.regained = unreal, recording.gained, _regained(recording)
+    laws.hastened = recording.hastened
     laws.tilt, laws.dt = machine.tilt, machine.step_of(recording.engine)
     laws.mover_count, laws.swing_count = len(machine.movers), len(recording.swings)
     laws.unsolved = recording.unsolved.max(initial=0.0) if len(recording.unsolved) else 0.0

@@ -279,6 +279,9 @@ class Record(Shown):
         Energy (J) made by the contact engine's solver beyond what moving surfaces and the removal
         of overlaps give, summed over all steps: rounding of the energy turned over, or the solver
         is wrong (docs/physics.md, "The law of a solve"). 0 for other engines.
+    hastened : float
+        Greatest acceleration of a particle by a push by hand, m/s²: laws allow for it as for
+        gravity.
     air_loss : float
         Energy of all particles lost to air, J; in the tracks it is part of the friction loss.
     totals : ndarray, shape (S,) or (0,), dtype `TOTAL`
@@ -326,6 +329,7 @@ class Record(Shown):
     angle: Floats = field(default_factory=lambda: np.zeros(0))
     instead: str = ""
     gained: float = 0.0
+    hastened: float = 0.0
     air_loss: float = 0.0
     totals: NDArray[Any] = field(default_factory=lambda: np.empty(0, TOTAL))
     unsolved: Floats = field(default_factory=lambda: np.empty(0))

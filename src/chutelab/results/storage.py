@@ -255,6 +255,7 @@ def _about(recording: Record, form: int = FORMAT) -> dict[str, Any]:
         "contacts": recording.contacts,
         **({"instead": recording.instead} if recording.instead else {}),
         "gained": recording.gained,
+        **({"hastened": recording.hastened} if recording.hastened else {}),
         **({"air_loss": recording.air_loss} if recording.scene.air_density else {}),
     }
 
@@ -292,7 +293,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     about.pop("seconds", None)  # earlier files have the time that the run took
     about.setdefault("gained", 0.0)  # ... and not this
     told = {name: about[name] for name in ("engine", "steps", "contacts", "gained")}
-    told["air_loss"] = about.get("air_loss", 0.0)
+    told |= {name: about.get(name, 0.0) for name in ("air_loss", "hastened")}
     instead = str(about.get("instead", ""))
     recording = Record(machine=machine, instead=instead, **told, **arrays)
     if _about(recording, about["format"]) | {"scene": about["scene"]} != about:
@@ -301,7 +302,9 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         "by_surface": arrays["by_surface"], "angle": recording.angle, "drives": recording.drives,
         "unsolved": recording.unsolved,
     }  # fmt: skip
-    numbers["gained"] = np.array([recording.gained, recording.air_loss], dtype=float)
+    numbers["gained"] = np.array(
+        [recording.gained, recording.air_loss, recording.hastened], dtype=float
+    )
     numbers |= {"hinge_work": recording.hinge_work, "springs": recording.springs}
     numbers["stopped"] = recording.stopped
     for name in ("knots", "events", "totals", "impulses", "lasting", "swings"):

@@ -10,8 +10,9 @@
 //      "stalled" or "failed". `triggered` are the times of what waits for a touch, s; `totals` the
 //      sums over all particles at each step, for machines with joints; `pushed` the work of all
 //      pushes and `given` that of all surfaces, J; `gained` the energy by which solves have broken
-//      their law so far, J; `regained` the greatest fall of losses, J; `unsolved` the
-//      largest overlap that a solve left, in radii. `books` and `reasons` come at the end.
+//      their law so far, J; `regained` the greatest fall of losses, J; `hastened` the
+//      greatest acceleration by a push, m/s²; `unsolved` the largest overlap that a solve left, in
+//      radii. `books` and `reasons` come at the end.
 //      {type: "laws", id, breaches}: the answer to "judge".
 //      {type: "broken"}: the core could not be loaded.
 
@@ -116,7 +117,8 @@ function tell(state: State) {
     triggered: core.triggered(), pushed: core.get("push_work"),
     given: core.books().slice(0, -1).reduce((sum, [work]) => sum + work, 0),
     books: over ? core.books() : null, reasons: over ? core.reasons() : null,
-    gained: core.get("gained"), regained: core.get("regained"), unsolved: core.get("unsolved_most"),
+    gained: core.get("gained"), regained: core.get("regained"),
+    hastened: core.get("hastened"), unsolved: core.get("unsolved_most"),
     contacts: core.get("impact_count"), steps: core.get("step_count"), loads: core.takeLoads(over),
   }, { transfer: [knots.buffer, tips.buffer] });
   job.turn = TURN;

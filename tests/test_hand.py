@@ -178,17 +178,25 @@ def test_a_push_is_force_times_time_although_impacts_cut_the_steps_of_joints():
 
 
 @pytest.mark.parametrize("seed", seeds(30, 300))
-def test_pushes_of_random_machines_close_the_ledger(seed):
-    """Crowds with belts and gates, or bodies with joints on what moves; particles and hinges."""
+def test_what_is_done_to_random_machines_by_hand_keeps_all_laws(seed):
+    """Crowds with belts and gates, or bodies with joints on what moves: pushed and set."""
     random = np.random.default_rng(seed)
     drawn = sandbox.bodies(seed, both=seed % 3 == 2) if seed % 3 else sandbox.draw(seed)
     run = chutelab.start(drawn)
     hung = [name for name, mover in run.scene.movers.items() if mover.hinge]
+    keys = {f"surface.{one.name}.speed": 2.0 for one in run.scene.surface}
+    keys |= {f"conveyor.{one.name}.speed": 2.0 for one in run.scene.conveyor}
+    for one in run.scene.surface:
+        if one.motor:
+            keys |= {f"surface.{one.name}.motor.{key}": 300.0 for key in ("torque", "speed_deg")}
     while not run.done:
         for _ in range(random.integers(3)):
             force = 10.0 ** random.uniform(-3.0, -0.5) * random.normal(size=2)
-            if hung and random.random() < 0.5:
+            if hung and random.random() < 0.3:
                 run.push(str(random.choice(hung)), force, at=random.normal(size=2))
+            elif keys and random.random() < 0.3:
+                key = str(random.choice(list(keys)))
+                run.set(key, keys[key] * random.uniform(0.0 if "torque" in key else -1.0, 1.0))
             else:
                 run.push(int(random.integers(len(run.positions))), force)
         run.step(10.0 ** random.uniform(-4.0, -1.0))
@@ -336,6 +344,23 @@ def test_belts_and_motors_are_set():
     expected = [radians(9.0), radians(-9.0) + braking, radians(-9.0)]
     assert np.diff(turned) == pytest.approx(expected, abs=1.5e-3)
     closes(run.recording)
+
+
+def test_a_motor_that_is_set_stronger_does_more_work(tmp_path):
+    """Against a damper d it ends at the rate T/d; its work is T times the angle."""
+    damper, torque = 0.05, 2.0
+    motor = {"speed_deg": 5000.0, "torque": 0.1}
+    arm = {"name": "arm", "from": [0.0, 0.0], "to": [0.3, 0.0], "hinge": "pivot", "damper": damper}
+    run = chutelab.start(scene((3.0, 3.0), [{**arm, "inertia": 1e-3, "motor": motor}], gravity=0.0))
+    run.step(0.5)
+    run.set("surface.arm.motor.torque", torque)
+    while not run.done:
+        run.step(0.1)
+    recording = Recording.load(run.recording.save(tmp_path / "run.npz"))
+    before, late, end = recording.pose("arm", [0.5, 0.9, 1.0])[:, 2]
+    assert (end - late) / 0.1 == pytest.approx(torque / damper, rel=1e-3)
+    work = motor["torque"] * before + torque * (end - before)
+    assert closes(recording).drive_work == pytest.approx(work, rel=1e-3)
 
 
 def test_a_run_that_was_steered_is_saved(tmp_path):

@@ -93,6 +93,7 @@ class Run:
         self._module, recorder = borrow(), Recorder(machine)
         self._origin, self._near = np.array(recorder.origin), recorder.near
         self._job = Job(self._module, self._near, whole=not any(recorder.origin))
+        self._torque = 0.0
         self._angles: dict[int, float] = {}
         self._pushed: set[int] = set()
         self._turned: set[int] = set()
@@ -202,6 +203,7 @@ class Run:
             for mover in build(new).movers:
                 if mover.hinge is not None:
                     rows["motor"][rows["surface"] == mover.surface] = mover.hinge.motor
+                    self._torque = max(self._torque, mover.hinge.motor[1])
         elif last == "speed" and new.streams == old.streams and not carried:
             rows = module.array("surfaces", dtype("Surface"), module.world.surface_count)
             rows["speed"] = pieces(build(new))["speed"][rows["material"]]
@@ -281,6 +283,7 @@ class Run:
             if not self.done:
                 job.stop()
             job.write(recorder)
+            recorder.torque = self._torque
             return Recording.of(recorder.finish(engine="contact", steps=module.world.step_count))
         finally:
             module.restore(kept)

@@ -174,9 +174,10 @@ def _hinges(recording: Record, figures: Any) -> list[Broken]:
         share = np.array([0.5 - sqrt(0.15), 0.5, 0.5 + sqrt(0.15)])
         rates = hinge.at(t[:-1, None] + h * share)[1]
         lost = hinge.damper * float((h * rates**2 @ np.array([5.0, 8.0, 5.0]) / 18.0).sum())
-        way = hinge.motor[1] * float(np.abs(np.diff(angle)).sum())
+        torque = max(hinge.motor[1], recording.torque)
+        way = torque * float(np.abs(np.diff(angle)).sum())
         # rad/s; change in a step by the hop of a hinge with the particles on it.
-        moments = hinge.motor[1] + hinge.spring * np.abs(angle - hinge.rest).max()
+        moments = torque + hinge.spring * np.abs(angle - hinge.rest).max()
         moments += recording.gravity * (hypot(*hinge.moment) + 2.0 * hinge.gyration * load)
         moments += hinge.damper * np.abs(rate).max()
         hop = 2.0 * float(moments) * recording.machine.dt / hinge.inertia
@@ -191,7 +192,7 @@ def _hinges(recording: Record, figures: Any) -> list[Broken]:
         )  # fmt: skip
         must(
             ENERGY, surface, abs(worked) - way,
-            HOPS * way + hinge.motor[1] * hop * lasts + CLOSES * play + EPS,
+            HOPS * way + torque * hop * lasts + CLOSES * play + EPS,
         )  # fmt: skip
         low, high = hinge.stops
         beyond = max(low - float(angle.min()), float(angle.max()) - high)

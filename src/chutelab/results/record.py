@@ -282,6 +282,8 @@ class Record(Shown):
     hastened : float
         Greatest acceleration of a particle by a push by hand, m/s²: laws allow for it as for
         gravity.
+    torque : float
+        Greatest torque of a motor that was set during the run, N m.
     air_loss : float
         Energy of all particles lost to air, J; in the tracks it is part of the friction loss.
     totals : ndarray, shape (S,) or (0,), dtype `TOTAL`
@@ -330,6 +332,7 @@ class Record(Shown):
     instead: str = ""
     gained: float = 0.0
     hastened: float = 0.0
+    torque: float = 0.0
     air_loss: float = 0.0
     totals: NDArray[Any] = field(default_factory=lambda: np.empty(0, TOTAL))
     unsolved: Floats = field(default_factory=lambda: np.empty(0))

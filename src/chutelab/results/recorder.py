@@ -163,7 +163,7 @@ class Recorder:
         self.ended = np.zeros(count, dtype=np.int8)
         self.drives, self.hinge_work = np.zeros(owners), np.zeros((owners, 4))
         self.contacts = 0
-        self.gained = self.hastened = self.air_loss = 0.0
+        self.gained = self.hastened = self.torque = self.air_loss = 0.0
         if machine.triggers:
             self.triggered = np.full(len(machine.triggers), np.inf)
         # For engines that count loads in Python, if loads are asked for.
@@ -400,6 +400,7 @@ class Recorder:
             angle=angle,
             gained=self.gained,
             hastened=self.hastened,
+            torque=self.torque,
             air_loss=self.air_loss,
             totals=self.totals,
             unsolved=self.unsolved,

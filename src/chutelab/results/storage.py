@@ -85,6 +85,9 @@ MAYBE = (
 )  # fmt: skip
 """Arrays that are left out if they are empty."""
 
+BY_HAND = "hastened", "torque"
+"""Numbers that the header has if they are not 0."""
+
 HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 """Readers of an array's shape and type, by the version of its format."""
 
@@ -255,7 +258,7 @@ def _about(recording: Record, form: int = FORMAT) -> dict[str, Any]:
         "contacts": recording.contacts,
         **({"instead": recording.instead} if recording.instead else {}),
         "gained": recording.gained,
-        **({"hastened": recording.hastened} if recording.hastened else {}),
+        **{name: value for name in BY_HAND if (value := getattr(recording, name))},
         **({"air_loss": recording.air_loss} if recording.scene.air_density else {}),
     }
 
@@ -293,7 +296,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     about.pop("seconds", None)  # earlier files have the time that the run took
     about.setdefault("gained", 0.0)  # ... and not this
     told = {name: about[name] for name in ("engine", "steps", "contacts", "gained")}
-    told |= {name: about.get(name, 0.0) for name in ("air_loss", "hastened")}
+    told |= {name: about.get(name, 0.0) for name in ("air_loss", *BY_HAND)}
     instead = str(about.get("instead", ""))
     recording = Record(machine=machine, instead=instead, **told, **arrays)
     if _about(recording, about["format"]) | {"scene": about["scene"]} != about:
@@ -302,9 +305,8 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         "by_surface": arrays["by_surface"], "angle": recording.angle, "drives": recording.drives,
         "unsolved": recording.unsolved,
     }  # fmt: skip
-    numbers["gained"] = np.array(
-        [recording.gained, recording.air_loss, recording.hastened], dtype=float
-    )
+    single = [told[name] for name in ("gained", "air_loss", *BY_HAND)]
+    numbers["gained"] = np.array(single, dtype=float)
     numbers |= {"hinge_work": recording.hinge_work, "springs": recording.springs}
     numbers["stopped"] = recording.stopped
     for name in ("knots", "events", "totals", "impulses", "lasting", "swings"):

@@ -191,7 +191,7 @@ def test_what_is_done_to_random_machines_by_hand_keeps_all_laws(seed):
             keys |= {f"surface.{one.name}.motor.{key}": 300.0 for key in ("torque", "speed_deg")}
     while not run.done:
         for _ in range(random.integers(3)):
-            force = 10.0 ** random.uniform(-3.0, -0.5) * random.normal(size=2)
+            force = 10.0 ** random.uniform(-3.0, 0.5) * random.normal(size=2)
             if hung and random.random() < 0.3:
                 run.push(str(random.choice(hung)), force, at=random.normal(size=2))
             elif keys and random.random() < 0.3:

@@ -290,6 +290,7 @@ int set_hinge_rows(SolverRow *rows, int body);
 void take_hinge_rows(const SolverRow *rows, int count, int body);
 
 /* hand.c */
+double hastened(void);
 void kick(Disk *d, double time);
 double pushed(const Disk *d, double f);
 void book_push(double *entries, double work);

@@ -17,6 +17,14 @@ EXPORT void push_disk(int i, double x, double y) {
     d->force[1] = y;
 }
 
+/* Greatest acceleration of a disk by a push in this step, m/s2. */
+double hastened(void) {
+    double most = 0;
+    for (int i = W.low; i < W.high && W.hastened > 0; i++)
+        most = MAX(most, W.disks[i].inv_mass * hypot(W.disks[i].force[0], W.disks[i].force[1]));
+    return most;
+}
+
 /* Give a disk what a push owes and its impulse for a time to come. */
 void kick(Disk *d, double time) {
     for (int n = 0; n < 2; n++) {

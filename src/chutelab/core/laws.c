@@ -285,11 +285,11 @@ static double energy_share(void) {
     return share + (L.energy ? touched * All.heaviest * All.gravity * L.late / L.energy : 0);
 }
 
-/* Energy that the removal of overlaps may give, J: at most what lifts all particles by the greatest overlap. On a surface
-   that accelerates by a they also hop by a h^2 / 8 in a step h, with a h^2 at most FALL r. For lone particles a knot in
-   contact has the mean velocity of a step, which differs from its ledger by half a step's acceleration: that of gravity
-   along the path, and that of an arc across it. Two that a cohesion F holds hop by it with the energy (F h)^2 / 4 m, half of
-   m being the mass of their relative motion; each has three such contacts. */
+/* Energy that the removal of overlaps may give, J: at most what lifts all particles by the greatest overlap, against
+   pushes by hand, too. On a surface that accelerates by a they also hop by a h^2 / 8 in a step h, with a h^2 at most FALL
+   r. For lone particles a knot in contact has the mean velocity of a step, which differs from its ledger by half a step's
+   acceleration: that of gravity along the path, and that of an arc across it. Two that a cohesion F holds hop by it with
+   the energy (F h)^2 / 4 m, half of m being the mass of their relative motion; each has three such contacts. */
 static double energy_parted(void) {
     if (L.engine == ENGINE_EXACT) return 0;
     if (!L.interact) {
@@ -297,7 +297,7 @@ static double energy_parted(void) {
         return All.heaviest * (L.speed * (All.gravity + L.haste) * L.dt + across);
     }
     double hop = L.alike ? 0 : MIN(FALL * All.smallest, L.haste * square(L.dt)) / 8;
-    double allowed = All.mass * (All.gravity * L.late + L.haste * hop);
+    double allowed = All.mass * ((All.gravity + L.hastened) * L.late + L.haste * hop);
     if (!L.alike) allowed += 0.75 * square(L.cohesion * L.dt) * All.lightness;
     if (L.alike) {
         /* The pymunk engine leaves out contacts that move a track by less than LEAVES_OUT of the radius. A cubic with an

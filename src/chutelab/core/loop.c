@@ -475,7 +475,8 @@ static int begin_step(void) {
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
     if (W.total_count >= W.total_room) return FULL_TOTALS;
     if (W.hinges && W.swing_count + 4 * W.mover_count > W.swing_room) return FULL_SWINGS;
-    double next = set_gates(W.t), stride = 0, press = W.g + W.haste, h = hop_time(W.disks + W.smallest, press), whirled = h;
+    double next = set_gates(W.t), stride = 0, press = W.g + W.haste + hastened();
+    double h = hop_time(W.disks + W.smallest, press), whirled = h;
     for (int i = W.low; i < W.high && W.outline_count; i++) {
         const Disk *d = W.disks + i;
         h = MIN(h, hop_time(d, press));

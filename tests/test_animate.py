@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.path import Path as Outline
 from matplotlib.transforms import Bbox
 from PIL import Image, ImageDraw
 
@@ -615,6 +616,20 @@ def test_names_go_along_with_what_leaves_its_place():
             assert np.hypot(*away) < 0.02 / wide.width * stage.view.get_window_extent().width + 12.0
 
 
+@pytest.mark.parametrize(
+    ("name", "surface"), [("flap-gate", "flap"), ("see-saw", "plank"), ("drum", "drum")]
+)
+def test_no_surface_moves_over_a_name_that_stays(name, surface):
+    recording = simulate(name)
+    stage = stage_of(recording, moments_at(tuple(np.linspace(*recording.t[[0, -1]], 40))))
+    (still,) = (one for one in stage.view.texts if one.get_gid() == f"name {surface}")
+    box = still.get_window_extent()
+    for index in range(40):
+        (own,) = (one for gid, one in moved(stage, index).items() if gid == f"surface {surface}")
+        line = stage.view.transData.transform(own.get_xydata())
+        assert not Outline(line).intersects_bbox(box, filled=False), index
+
+
 def test_a_film_of_many_is_of_all_of_them_to_the_end():
     spots = [(0.015 * (i % 40) - 0.3, 0.01 + 0.015 * (i // 40)) for i in range(400)]
     machine = machine_of(
@@ -954,7 +969,14 @@ def test_films_and_the_still_can_be_chosen(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "by"), [("see-saw", "drives"), ("damper-plate", "drives"), ("slip", "belt_work")]
+    ("name", "by"),
+    [
+        ("see-saw", "nothing"),
+        ("damper-plate", "belt_work"),
+        ("slip", "belt_work"),
+        ("drum", "drives"),
+        ("arch", "nothing"),
+    ],
 )
 def test_hinges_whose_energy_is_known_of_whole_runs_only_are_told_as_what_gives_it(name, by):
     assert paid_by(simulate(name)) == by

@@ -6,7 +6,7 @@ import pytest
 
 from chutelab import machine, scene
 from chutelab.engines import exact
-from chutelab.engines.simulation import choose
+from chutelab.engines.simulation import choose, simulate
 from chutelab.results import ENTRIES
 from chutelab.results.ledger import ledger
 
@@ -65,6 +65,21 @@ def test_what_is_of_the_size_of_rounding_is_shown_as_none_unless_in_detail(share
         sheet = books.sheet(details=details)
         assert (sheet.foot[0][-1] != "0") is (shown or details)
         assert sheet.notes[0].startswith("kinetic 0 -> ") is not (shown or details)
+
+
+def test_without_belts_no_work_is_told_as_theirs():
+    """What a plank gives each ball on it is ½ m v² + m g Δy: they neither roll nor slip."""
+    recording = simulate("see-saw")
+    sheet = ledger(recording).sheet()
+    assert sheet.columns == ("", "restitution loss", "friction loss", "work on it")
+    told = {row[0]: row[-1] for row in sheet.rows}
+    assert told["plank"] == told["particles"] == ""
+    first, last = recording.ends()
+    for name, m, k0, k1 in zip(("left", "right"), (0.008, 0.016), first, last, strict=True):
+        spin = 0.5 * 0.5 * m * 0.01**2 * k1["omega"] ** 2
+        gained = 0.5 * m * (k1["velocity"] ** 2).sum() + spin
+        gained += m * G * (k1["position"][1] - k0["position"][1])
+        assert float(told[f"of {name}"]) == pytest.approx(gained, rel=1e-5), name
 
 
 @pytest.mark.parametrize("spins", [False, True])

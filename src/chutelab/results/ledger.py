@@ -26,6 +26,9 @@ ROUNDING = 1e-12
 UNSEEN = 5e-6
 """Share of the energy turned over that is shown as 0.000 %; a heap at rest trembles with less."""
 
+LOSSES = "restitution_loss", "friction_loss"
+"""Entries that every ledger has."""
+
 AIR = "still air"
 """Its row among the surfaces of a ledger; no surface may have a name with a space."""
 
@@ -97,7 +100,7 @@ class Ledger(Shown):
     def sheet(self, *, details: bool = False) -> Sheet:
         """Return the entries of each surface that has any, their sum, and the residual.
 
-        With `details` the residual is shown down to rounding.
+        Works that are all 0 have no column. With `details` the residual is shown down to rounding.
         """
         share = self.relative_residual
         left = (
@@ -111,27 +114,42 @@ class Ledger(Shown):
             rounding = abs(entry) <= share * self.turned_over and not details
             return number(0.0 if rounding else entry)
 
-        names = [*dict.fromkeys(chain.from_iterable(self.by_surface.values()))]
-        total = [getattr(self, name) for name in names]
+        every = [*dict.fromkeys(chain.from_iterable(self.by_surface.values()))]
+        names = [
+            name
+            for name in every
+            if name in LOSSES or any(entries.get(name) for entries in self.by_surface.values())
+        ]
+        heads = [name.replace("_", " ") for name in names]
+
+        def row(name: str, entries: dict[str, Any]) -> list[str]:
+            return [name, *(told(entries[one]) if one in entries else "" for one in names)]
+
+        rows = [
+            row(name, dict.fromkeys(names, 0.0) | entries)
+            for name, entries in self.by_surface.items()
+            if any(entries.values())
+        ]
+        total = row("total", {name: getattr(self, name) for name in names})
+        if len(every) > len(ENTRIES) and self.by_stream:
+            # What moving surfaces and springs give a stream is not the work of belts.
+            heads, rows, total = [*heads, "work on it"], [[*one, ""] for one in rows], [*total, ""]
+            for name, own in self.by_stream.items():
+                losses = {one: own[one] for one in LOSSES}
+                rows.append([*row(f"of {name}", losses), told(own["belt_work"])])
+        else:
+            rows += [row(f"of {name}", own) for name, own in self.by_stream.items()]
         kept = {"kinetic": self.kinetic, "potential": self.potential}
         kept |= {"spring": self.spring} if any(self.spring) else {}
         moved = (
             f"{name} {told(before, UNSEEN)} -> {told(after, UNSEEN)} J"
             for name, (before, after) in kept.items()
         )
-        rows = [
-            (name, [entries.get(entry, 0.0) for entry in names])
-            for name, entries in self.by_surface.items()
-        ]
-        rows += [
-            (f"of {name}", [share.get(entry, 0.0) for entry in names])
-            for name, share in self.by_stream.items()
-        ]
         return Sheet(
             "Energy ledger, J",
-            ("", *(name.replace("_", " ") for name in names)),
-            tuple((name, *map(told, entries)) for name, entries in rows if any(entries)),
-            foot=(("total", *map(told, total)),),
+            ("", *heads),
+            tuple(map(tuple, rows)),
+            foot=(tuple(total),),
             notes=(", ".join(moved), left),
         )
 

@@ -48,6 +48,7 @@ from chutelab.pictures.animation.files import (
 )
 from chutelab.pictures.animation.moments import Moment, asked, film, slowness, span
 from chutelab.pictures.plots import Window, analytic_of, draw_analytic, draw_scene, style, window_of
+from chutelab.pictures.plots.machinery import swept
 from chutelab.pictures.plots.panels import path_of_arcs
 from chutelab.pictures.plots.scenery import (
     FINE,
@@ -197,7 +198,8 @@ class Stage:
         self.figure = Picture(inches, layout.dpi)
         self.view = view = self.figure.add_axes(layout.view)
         parts = analytic_of(recording)[0] if "parabola" in shows else ()
-        draw_scene(view, recording.machine, layout.window, clear=path_of_arcs(parts))
+        clear = [path_of_arcs(parts), *swept(recording)]
+        draw_scene(view, recording.machine, layout.window, clear=clear)
         view.set(xticks=[], yticks=[])
         for spine in view.spines.values():
             spine.set_color(style.STEEL_LIGHT)

@@ -323,6 +323,9 @@ SIGNS = {
 }
 """The ledger with everything on one side: start + belt work + residual - K - U - losses = 0."""
 
+ROWS = 7
+"""Rows of the ledger for which there is room at full height."""
+
 BASE = 0.78
 """Share of a row above its text's base line."""
 
@@ -350,7 +353,7 @@ def bars(
 
     The column's left, bottom, width and height are shares of the picture. The ledger is as for
     `stacks`; the highest bar sets the scale. The work of belts, drives and hinges is one block,
-    with the name `drives`.
+    with the name `drives`. What a machine has none of has no row.
     """
     sides = stacks(balance)
     highest = float(np.max(sum(sides[0].values())))
@@ -369,11 +372,17 @@ def bars(
         drawn.append(Bar(ax, left, left + 0.8, heights, [style.ENERGY[name] for name in heights]))
     picture, writings = ax.figure.canvas.figure, []
     left, bottom, width, height = column
-    line = height / len(sides[0])
-    for row, name in enumerate(sides[0]):
+    rows = {}
+    for name in sides[0]:
         shown = [round(factor * value, 1) + 0.0 for value in balance[name].tolist()]
-        if name == "residual" and not any(shown):
-            continue
+        absent = {
+            "belt_work": drives == "nothing", "spring": not balance[name].any(),
+            "damper_loss": not balance[name].any(), "residual": not any(shown),
+        }  # fmt: skip
+        if not absent.get(name, False):
+            rows[name] = shown
+    line = height / max(ROWS, len(rows))
+    for row, (name, shown) in enumerate(rows.items()):
         told = drives if name == "belt_work" else name
         said = [figures(value, ".1f") for value in shown]
         top = bottom + height - row * line

@@ -27,15 +27,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
+from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 
 from chutelab.pictures import BLUE, GREEN, ORANGE, VERMILION
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.machinery import (
     draw_bodies,
-    draw_last,
+    draw_moved,
     draw_scene,
     halo,
+    swept,
 )
 from chutelab.pictures.plots.panels import (
     Arc,
@@ -197,26 +199,36 @@ def draw_view(
 ) -> Axes:
     """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend.
 
-    Moving surfaces are drawn at the beginning, dashed, and at the end. A `crowd` has the envelope
-    of the paths instead of particle 0's track. With `bodies` the particles are drawn, too, at the
-    last time at which at least half of them are in sight.
+    Moving surfaces are drawn at the beginning, dashed, at the end, and lightly at the times of the
+    strobe dots. A `crowd` has the envelope of the paths instead of particle 0's track. With
+    `bodies` the particles are drawn, too, and surfaces at their time instead of the end: the last
+    time at which at least half of them are in sight.
     """
     style.dress(ax, say("x"), say("y"))
     machine = recording.machine
-    draw_last(ax, machine, recording.t[-1])
-    draw_scene(ax, machine, window_of(recording), clear=path_of_arcs(parts))
+    t = fullest(recording) if bodies else float(recording.t[-1])
+    ghosts = [] if bodies or not machine.movers else strobe_times(recording).tolist()
+    draw_moved(ax, machine, t, ghosts)
+    clear = [path_of_arcs(parts), *swept(recording)]
+    draw_scene(ax, machine, window_of(recording), clear=clear)
     draw_analytic(ax, parts)
     draw_tracks(ax, recording, marks=not crowd)
     if crowd and not one_of_many(recording):
         draw_envelope(ax, recording)
     draw_sensors(ax, recording)
     handles = ax.get_legend_handles_labels()[0]
+    shown = ["particles"] if bodies else []
     if bodies:
-        t = fullest(recording)
         draw_bodies(ax, recording, t, crowd=crowd)
-        ax.set_xlabel(say("x-with-particles", time=figures(t)))
-    if len(recording.machine.streams) > 1:
-        handles += stream_handles(recording.machine)
+        if not crowd:
+            dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0, "color": style.STRIKE}
+            handles.append(Line2D([], [], **dot, label=say("particle-0")))
+    if machine.movers:
+        shown = ["both"] if bodies else ["surfaces"]
+    if shown:
+        ax.set_xlabel(say(f"x-with-{shown[0]}", time=figures(t)))
+    if len(machine.streams) > 1:
+        handles += stream_handles(machine, all_of_them=bodies and crowd)
     if legend:
         style.legend_above(ax, 4, handles)
     return ax
@@ -257,7 +269,7 @@ def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording, *, c
     times = np.linspace(clock.min(), clock.max(), 4)
     for t, cell in zip(times, np.ndindex(*grid), strict=True):
         ax = figure.add_subplot(cells[cell])
-        draw_last(ax, recording.machine, t)
+        draw_moved(ax, recording.machine, t)
         draw_scene(ax, recording.machine, window, small=True)
         draw_bodies(ax, recording, t, crowd=crowd)
         ax.set(xticks=[], yticks=[])

@@ -25,7 +25,7 @@ from matplotlib.transforms import Bbox
 
 from chutelab.machine import Arcs, Machine, Pieces, Segments, placed
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.scenery import Window, around, motion, strings
+from chutelab.pictures.plots.scenery import Window, around, drawn_tracks, motion, strings
 from chutelab.pictures.plots.style import figures, named, say, stream_colours
 from chutelab.results import Recording
 from chutelab.util.arrays import Floats, Ints
@@ -200,11 +200,11 @@ def draw_scene(
     window: Window | None = None,
     *,
     small: bool = False,
-    clear: Floats | None = None,
+    clear: Sequence[Floats] = (),
 ) -> Axes:
     """Draw the machine's surfaces to scale, with their names, but small with thinner lines only.
 
-    Names keep clear of a path (P, 2), m, that is drawn later.
+    Names keep clear of paths (P, 2), m, that are drawn later.
 
     Gates are dashed, and so are moving surfaces, at their places in the scene file. Surfaces that
     are solid from one side have an arrow in the direction in which they let particles through. The
@@ -240,8 +240,7 @@ def draw_scene(
         ax.plot(*np.array(anchors).T, "o", color=style.WALL, ms=3.0, zorder=2.0, gid="anchors")
     if not small:
         names = _Names(ax, machine, found, shown, deep)
-        if clear is not None and len(clear):
-            names.lines.append((Path(ax.transData.transform(clear)), False))
+        names.lines += [(Path(ax.transData.transform(path)), False) for path in clear if len(path)]
         names.write()
     return ax
 
@@ -252,15 +251,40 @@ def _passage(piece: Pieces) -> tuple[Floats, Floats]:
     return middle, -PASSAGE * piece.one_sided * piece.normal(middle)
 
 
-def draw_last(ax: Axes, machine: Machine, t: float) -> Axes:
-    """Draw moving surfaces at a time (s), in thin lines."""
-    movers = {mover.surface: mover for mover in machine.movers}
-    for piece in pieces(machine) if movers else ():
-        if mover := movers.get(int(piece.surface)):
-            gid = f"last {machine.surfaces[mover.surface]}"
-            color = colour_of(machine, piece)
-            ax.plot(*mover.carried(piece.path(), t).T, color=color, lw=1.3, zorder=1.9, gid=gid)
+def draw_moved(ax: Axes, machine: Machine, t: float, ghosts: Sequence[float] = ()) -> Axes:
+    """Draw moving surfaces at a time (s), and in thin light lines at others."""
+    for piece in pieces(machine):
+        if mover := machine.mover(int(piece.surface)):
+            color, name = colour_of(machine, piece), machine.surfaces[piece.surface]
+            look: dict[str, Any] = {"color": style.tint(color, 0.3), "lw": 1.0, "zorder": 1.5}
+            for ghost in ghosts:
+                ax.plot(*mover.carried(piece.path(), ghost).T, gid=f"ghost {name}", **look)
+            look = {"color": color, "lw": 1.8, "zorder": 2.1, "gid": f"last {name}"}
+            ax.plot(*mover.carried(piece.path(), t).T, **look)
     return ax
+
+
+PASSED = 13
+"""Times of a run at whose places of moving surfaces there should be no names."""
+
+
+def swept(recording: Recording) -> list[Floats]:
+    """Return the pieces of moving surfaces at `PASSED` times, and tracks of particles on them.
+
+    Each is a line (P, 2), m; there are none if nothing moves.
+    """
+    machine = recording.machine
+    if not machine.movers:
+        return []
+    times = np.linspace(recording.t[0], recording.t[-1], PASSED)
+    found = [
+        mover.carried(piece.path(), time)
+        for piece in pieces(machine)
+        if (mover := machine.mover(int(piece.surface)))
+        for time in times.tolist()
+    ]
+    tracks = (recording.track(i)["position"] for i in drawn_tracks(recording).tolist())
+    return [*found, *tracks]
 
 
 Spot = tuple[Floats, tuple[float, float], str, str]
@@ -323,7 +347,10 @@ class _Names:
                 middle, tail = _passage(piece)
                 tip = ax.transData.transform(middle)
                 self.lines.append((Path([tip, tip + tail * ax.figure.dpi / 72.0]), False))
-        self.starts = ax.transData.transform(machine.releases.position)
+        # Boxes round the particles at their release.
+        starts = machine.releases.position
+        reach = np.broadcast_to(machine.particle.radius, len(starts))[:, None]
+        self.starts = [ax.transData.transform(starts + side * reach) for side in (-1.0, 1.0)]
         self.taken: list[Bbox] = []
 
     def write(self) -> None:
@@ -348,7 +375,7 @@ class _Names:
                 offset = (offset[0] + right * points, offset[1] + up * points)
                 spot, box = (where, offset, across, along), box.translated(right, up)
                 # Lines, circles and releases that it would cover.
-                on = (self.starts > box.min) & (self.starts < box.max)
+                on = (self.starts[1] > box.min) & (self.starts[0] < box.max)
                 hides = sum(line.intersects_bbox(box, filled=whole) for line, whole in self.lines)
                 hides += bool(on.all(axis=1).any())
                 if box.count_overlaps(self.taken) or (best is not None and hides >= best[0]):

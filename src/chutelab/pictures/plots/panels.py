@@ -268,6 +268,9 @@ def _beyond(times: Floats) -> float:
     return float(times[-1] + (0.04 * (times[-1] - times[0]) or 1e-3))
 
 
+ALWAYS = ("kinetic", "potential", "restitution_loss", "friction_loss")
+"""Entries that are shown even if they are 0 throughout."""
+
 SHOWN = 1e-9
 """A residual larger than this share of the energy put in is not rounding."""
 
@@ -275,9 +278,9 @@ SHOWN = 1e-9
 def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes:
     """Draw the energy ledger of all particles over time.
 
-    Kinetic and potential energy and both losses are stacked; energy at release plus belt work is a
-    line. The line is at the top of the stack except for the residual, which the title states:
-    always with `details`, otherwise if it is more than rounding.
+    Energies and losses are stacked; energy at release plus the work of belts and drives is a line.
+    The line is at the top of the stack except for the residual, which the title states: always with
+    `details`, otherwise if it is more than rounding.
     """
     t = recording.knots["t"]
     times = np.linspace(t.min(), t.max(), 240)
@@ -292,7 +295,7 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
         for name in (
             "kinetic", "potential", "spring", "restitution_loss", "friction_loss", "damper_loss",
         )
-        if name in balance
+        if name in balance and (name in ALWAYS or balance[name].any())
     ]  # fmt: skip
     ax.stackplot(
         times,
@@ -302,10 +305,7 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
         linewidth=0.0,
     )
     (line,) = ax.plot(times, factor * supplied, color=style.INK, lw=1.6, gid="supplied")
-    line.set(
-        linestyle=(0, (4, 1.5)),
-        label=say("supplied" if (by := paid_by(recording)) == "belt_work" else f"supplied-{by}"),
-    )
+    line.set(linestyle=(0, (4, 1.5)), label=say(f"supplied-{paid_by(recording)}"))
     residual = float(balance["residual"][-1])
     title = say("ledger")
     if details or abs(residual) > SHOWN * np.abs(supplied).max():

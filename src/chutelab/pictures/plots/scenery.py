@@ -15,6 +15,7 @@ from chutelab.machine.parts import Mover
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.quantities import each
+from chutelab.results.record import PARTICLES
 from chutelab.results.stream import FEWEST
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.errors import InputError
@@ -192,7 +193,7 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     balance["potential"] = np.maximum(lifted, 0.0)
     balance["start"] = at_release[released] - weight * zero
     hung = [one for one in recording.machine.movers if one.hinge]
-    if hung and paid_by(recording) == "drives":
+    if hung and paid_by(recording) != "hinges":
         balance |= {"spring": np.zeros_like(times), "damper_loss": np.zeros_like(times)}
         for one in hung:
             _hang(balance, one, recording, times)
@@ -260,10 +261,14 @@ def one_of_many(recording: Recording) -> bool:
 
 
 def bodily(recording: Recording) -> bool:
-    """Whether all particles are shown: `one_of_many`, boxes, polygons, or on strings."""
+    """Whether all particles are shown: `one_of_many`, boxes, polygons, on strings or movers.
+
+    With a conveyor, the path of particle 0 says more than its place on a surface that moves.
+    """
     machine = recording.machine
     corners = any(outline is not None for outline in machine.outlines)
-    return one_of_many(recording) or corners or bool(machine.joints)
+    carried = bool(machine.movers) and machine.pulley is None
+    return one_of_many(recording) or corners or bool(machine.joints) or carried
 
 
 def stays(recording: Recording) -> Bools:
@@ -292,16 +297,23 @@ def drawn_tracks(recording: Recording) -> Ints:
 
 
 def paid_by(recording: Recording) -> str:
-    """Return the name of the energy input in pictures: "belt_work", "drives", or "hinges".
+    """Return the name of the energy input in pictures.
 
-    Work by hand on plates, and in Pymunk the loss at stops, is known only for whole runs. Then
+    It is "drives", "belt_work", "forces" of springs and hands, "nothing", or "hinges". Work by hand
+    on plates, and in Pymunk the loss at stops, is known only for whole runs. Then
     hinges have no energies of their own, but give or take energy.
     """
-    hinges = [one.hinge for one in recording.machine.movers if one.hinge]
+    machine = recording.machine
+    hinges = [one.hinge for one in machine.movers if one.hinge]
     untold = not len(recording.stopped)
     if any(one.steered or (untold and np.isfinite(one.stops).any()) for one in hinges):
         return "hinges"
-    return "drives" if recording.machine.movers else "belt_work"
+    if any(one.hinge is None or any(one.hinge.motor) for one in machine.movers):
+        return "drives"
+    if any(piece.speed for piece in machine.pieces):
+        return "belt_work"
+    forces = recording.by_surface[recording.surfaces.index(PARTICLES)][0]
+    return "forces" if forces or len(recording.springs) else "nothing"
 
 
 POSES = 61

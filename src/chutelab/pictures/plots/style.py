@@ -294,14 +294,17 @@ LONGEST = 20
 """Most characters of a stream's name in a legend."""
 
 
-def stream_handles(machine: Machine) -> list[Line2D]:
-    """Return handles for a legend of the streams, unless there is only particle 0."""
+def stream_handles(machine: Machine, *, all_of_them: bool = False) -> list[Line2D]:
+    """Return handles for a legend of the streams.
+
+    One of particle 0 alone is left out, as it has its own handle, but with `all_of_them`.
+    """
     hues = stream_colours(len(machine.streams))
     sizes = np.bincount(machine.releases.stream, minlength=len(hues))
     return [
         Line2D([], [], ls="none", marker="o", ms=6.0, color=hue, label=plain(named(one)[:LONGEST]))
         for i, (one, hue) in enumerate(zip(machine.streams, hues, strict=True))
-        if i or sizes[0] > 1
+        if i or sizes[0] > 1 or all_of_them
     ]
 
 

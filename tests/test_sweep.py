@@ -35,6 +35,7 @@ from chutelab.studies.sweep import (
 from chutelab.studies.sweep.plan import row_of, runs
 from chutelab.studies.sweep.plan import swept as swept_block
 from chutelab.util.errors import InputError
+from handmade import assert_legible
 from shared import call, some
 from typed import planned, sweep
 
@@ -600,6 +601,21 @@ def test_a_map_is_hatched_where_the_plate_is_missed():
     points = np.column_stack([swept.columns["incoming.speed"], swept.columns["plate.restitution"]])
     inside = hatched.get_paths()[0].contains_points(points)
     assert inside.tolist() == passes(points[:, 0]).tolist()
+
+
+@pytest.mark.parametrize("count", [3, 9], ids=["lines", "map"])
+def test_a_picture_is_legible_and_says_up_to_when_it_counts(count):
+    from chutelab.pictures.plots.studies import sweep_figure
+
+    vary = ["plate.angle_deg=-20:40:9", f"incoming.speed=2:4:{count}"]
+    for until, told in (("landed", "up to the landing"), ("settled", "until nothing slips")):
+        swept = sweep(load("perpendicular", [f"run.until={until}"]), vary)
+        for column in (PAID, "landing.vx.mean"):
+            figure = sweep_figure(swept, column)
+            figure.canvas.draw()
+            assert_legible(figure, 1.0)
+            labels = " ".join(ax.get_ylabel() for ax in figure.axes).replace("\n", " ")
+            assert (told in labels) is (column == PAID)
 
 
 def test_help_names_the_columns():

@@ -370,6 +370,25 @@ def every(surfaces: Collection[str], count: int) -> Iterator[Quantity]:
                 yield found
 
 
+def counted(name: str, until: str | float | None = None) -> str:
+    """Return up to when a quantity of the ledger is counted in runs up to `run.until`, or "".
+
+    Examples
+    --------
+    >>> counted("belt_work"), counted("ledger.belt_work", "landed"), counted("landing.x")
+    ('until nothing slips', 'up to the landing', '')
+    """
+    paid = name in REGISTRY and REGISTRY[name].of == "lone"
+    if not (paid or name.startswith("ledger.")):
+        return ""
+    said = {
+        "landed": "up to the landing",
+        "settled": "until nothing slips",
+        "None": "up to run.until",
+    }
+    return said.get("settled" if paid else str(until), f"up to t = {until} s")
+
+
 def whose(row: Quantity, count: int) -> str:
     """Return how to name one of several particles; "" if the name does so already.
 

@@ -25,6 +25,7 @@ from chutelab.pictures.plots import style
 from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.scenery import around
 from chutelab.pictures.plots.style import Picture
+from chutelab.scene.quantities import counted
 from chutelab.scene.units import symbol, with_unit
 from chutelab.studies.design import Solution, Uncertainty
 from chutelab.studies.discharge import SideBySide, stream_at
@@ -43,6 +44,16 @@ MISSING = "///"
 """Hatch where the plate is never met."""
 
 
+TALL = 44
+"""Most characters of a line beside axes; longer labels have two lines."""
+
+
+def axis_label(name: str, unit: str, until: str | float | None = None, what: str = "") -> str:
+    """Return the label of an axis: a quantity, or what it is, up to when it counts, its unit."""
+    said = ", ".join(filter(None, [what or name, counted(name, until)]))
+    return fill(with_unit(said, unit), TALL, break_long_words=False)
+
+
 def scan(solution: Solution) -> Picture:
     """Draw a search over one key: the quantity, its target, answers and jumps.
 
@@ -58,7 +69,8 @@ def scan(solution: Solution) -> Picture:
     ax = figure.add_axes((0.105, 0.115, 0.865, 0.66))
     key, (name, *_), (unit, *_) = solution.ranges[0], solution.quantities, solution.units
     factor, said = style.scaled(found.values, unit)
-    style.dress(ax, with_unit(key.key, key.unit), with_unit(name, said))
+    until = solution.base.run.until
+    style.dress(ax, with_unit(key.key, key.unit), axis_label(name, said, until))
     for i, piece in enumerate(found.pieces):
         look: dict[str, Any] = {"color": style.TRACK, "lw": 1.8, "zorder": 4.0, "gid": "quantity"}
         ax.plot(piece.x, factor * piece.values[:, 0], label="" if i else style.plain(name), **look)
@@ -110,12 +122,12 @@ def _searched(solution: Solution) -> Picture:
     name, unit = solution.quantities[0], solution.units[0]
     factor, said = style.scaled(mean[:, :1], unit)
     keys = [with_unit(one.key, one.unit) for one in solution.ranges[:2]]
-    label = with_unit(name, said)
-    style.dress(ax, keys[0], keys[1] if len(keys) > 1 else label)
+    told = axis_label(name, said, solution.base.run.until)
+    style.dress(ax, keys[0], keys[1] if len(keys) > 1 else told)
     best = solution.answer if solution.solved or solution.nearest else None
     if len(keys) > 1:
         known = ax.scatter(points[:, 0], points[:, 1], c=factor * mean[:, 0], cmap=COLORS, s=22.0)
-        style.colour_bar(ax, known, label)
+        style.colour_bar(ax, known, told)
     else:
         look: dict[str, Any] = {"fmt": "o", "ms": 4.0, "color": style.TRACK, "capsize": 2.5}
         ax.errorbar(points[:, 0], factor * mean[:, 0], factor * error[:, 0], **look)
@@ -189,7 +201,7 @@ def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
     values = values[np.isfinite(values)]
     factor, unit = style.scaled(values, found.units[row])
     name = found.quantities[row]
-    style.dress(ax, with_unit(name, unit), "samples", name)
+    style.dress(ax, axis_label(name, unit), "samples", name)
     if not len(values):
         return ax
     low, high = factor * found.interval[row]
@@ -218,7 +230,7 @@ def draw_strongest(ax: Axes, found: Uncertainty, row: int) -> Axes:
     one = found.spreads[k]
     values = found.outputs[:, row]
     factor, unit = style.scaled(values, found.units[row])
-    quantity = with_unit(found.quantities[row], unit)
+    quantity = axis_label(found.quantities[row], unit)
     style.dress(ax, with_unit(one.key, one.unit), quantity, f"against {one.key}")
     look: dict[str, Any] = {"color": style.TRACK, "ms": 3.0, "alpha": 0.5, "zorder": 3.0}
     ax.plot(found.inputs[:, k], factor * values, ".", **look)
@@ -279,7 +291,9 @@ def sweep_figure(swept: Sweep, column: str) -> Picture:
         raise ValueError(no_column(column))
     figure = Picture((8.6, 5.4))
     draw_sweep(figure.add_subplot(), swept, column)
-    figure.subplots_adjust(left=0.115, right=0.97, top=0.86, bottom=0.18)
+    # Room for the label of a colour bar.
+    right = 0.97 if len(figure.axes) == 1 else 0.87
+    figure.subplots_adjust(left=0.13, right=right, top=0.86, bottom=0.2)
     figure.headline(0.03, 0.955, swept.title)
     gone = np.flatnonzero(~np.isfinite(swept.columns[column]))
     reasons = Counter(reason for reason in swept.columns[REASON][gone].tolist() if reason)
@@ -287,8 +301,8 @@ def sweep_figure(swept: Sweep, column: str) -> Picture:
     seeds = f"bars: ± the standard error of the mean of {swept.repeat} seeds"
     said = f"{len(gone):,} of {len(swept):,} have none{why}" if len(gone) else ""
     said = "; ".join(filter(None, (seeds if swept.repeat > 1 else "", said)))
-    said = shorten(said, 118, placeholder=" …")
-    figure.remark(0.03, 0.03, said, fontsize=style.SMALL, va="center")
+    said = fill(said, 118, max_lines=2, placeholder=" …")
+    figure.remark(0.03, 0.045, said, fontsize=style.SMALL, va="center")
     return figure
 
 
@@ -306,7 +320,7 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
     if column.endswith(".spread"):
         what = f"Standard deviation of {column.removesuffix('.spread')}"
     scale, unit = style.scaled(swept.columns[column], unit)
-    label, z = with_unit(what, unit), scale * swept.columns[column]
+    told, z = axis_label(column, unit, swept.until, what), scale * swept.columns[column]
     bars = scale * swept.columns[f"{column}{ERROR}"] if swept.repeat > 1 else None
     counts = [len(np.unique(swept.columns[key])) for key in keys]
     sampled = swept.shape is None
@@ -316,7 +330,7 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
         keys = sorted(keys, key=lambda key: -len(np.unique(swept.columns[key])))
     first, second = (swept.columns[key] for key in (keys[0], keys[-1]))
     names = [with_unit(key, swept.unit(key)) for key in keys]
-    style.dress(ax, names[0], names[1] if by_colour else label)
+    style.dress(ax, names[0], names[1] if by_colour else told)
     if by_colour:
         known = np.isfinite(z)
         if sampled:
@@ -328,8 +342,8 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
             painted = draw_heat(ax, first, second, z, swept.columns["impact.count"] == 0.0)
         if known.any():
             if bars is not None and np.isfinite(bars).any():
-                label += f" ± {np.nanmedian(bars):.2g}"
-            style.colour_bar(ax, painted, label)
+                told += f" ± {np.nanmedian(bars):.2g}"
+            style.colour_bar(ax, painted, told)
         return ax
     if sampled:
         ax.errorbar(first, z, bars, fmt="o", ms=3.5, color=style.TRACK, alpha=0.7, capsize=2.5)

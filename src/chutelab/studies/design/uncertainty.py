@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from chutelab.scene import AnyScene, Scene, SceneError, load
 from chutelab.scene.overrides import limits_of, parts_of, rule_at, value_at
+from chutelab.scene.quantities import counted
 from chutelab.scene.units import read_size, with_unit
 from chutelab.scene.variants import Vary, quantity, reason, refuse_texts
 from chutelab.studies.design.evaluation import INSIDE, Evaluator, each_once, measured, scipy
@@ -385,6 +386,9 @@ class Uncertainty(Shown):
         if rare and len(self.kinds) > 1:
             others = f"{len(rare)} other ways" if len(rare) > 1 else "another way"
             said.append(f"{100.0 * sum(rare):.2g} % of the samples go {others}.")
+        for name in self.quantities:
+            if until := counted(name):
+                said.append(f"{name} is counted {until}.")
         total = len(self.inputs)
         for why, count in sorted(self.lost.items(), key=lambda item: -item[1])[:3]:
             said.append(f"{count} of {total} samples are left out: {why}.")

@@ -463,6 +463,6 @@ def _gathered(plan: Plan, blocks: Sequence[Columns]) -> Sweep:
         quantities=dict(zip(plan.keys, plan.quantities, strict=True)),
         columns=joined(blocks),
         shape=None if plan.samples is not None else tuple(len(v.values) for v in plan.varies),
-        settled=plan.scene.run.until == "settled",
+        until=plan.scene.run.until,
         repeat=plan.repeat,
     )

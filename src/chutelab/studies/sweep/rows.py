@@ -315,8 +315,8 @@ class Sweep(Shown):
         missing.
     shape : tuple of int or None
         Values of each key in a grid, whose last key runs fastest; None for samples.
-    settled : bool
-        Whether all runs go on until nothing slips.
+    until : str or float
+        The scene's ``run.until``, up to which ledgers count.
     repeat : int
         Seeds that each variant was run with; with several, columns are means, and ``NAME.error``
         is the standard error of the column ``NAME``.
@@ -326,7 +326,7 @@ class Sweep(Shown):
     quantities: Mapping[str, Quantity]
     columns: Mapping[str, NDArray[Any]]
     shape: tuple[int, ...] | None
-    settled: bool = False
+    until: str | float = "landed"
     repeat: int = 1
 
     def __post_init__(self) -> None:
@@ -377,7 +377,7 @@ class Sweep(Shown):
                 f"Means over {self.repeat} seeds, the same for all variants, and the median of"
                 " their standard errors."
             )
-        if not self.settled and np.any(np.nan_to_num(self.columns[HEAT])):
+        if self.until != "settled" and np.any(np.nan_to_num(self.columns[HEAT])):
             notes.append(PARTIAL)
         ways = Counter(way for way in self.columns[TOUCHES].tolist() if way)
         if len(ways) > 1:

@@ -322,6 +322,24 @@ DAMAGE = """([column, change]) => {
 }"""
 
 
+def test_a_page_shows_no_work_and_no_numbers_that_its_machine_has_not(shown, tmp_path):
+    """A see-saw has no drive and no belt. A lone ball falls from height 0: m g y = -½ m g² t²."""
+    for name, has in (("see-saw", False), ("perpendicular", True)):
+        page = shown(name)
+        assert page.locator("#energy tr[data-id=kinetic]").is_visible()
+        assert page.locator("#energy tr[data-id=belt_work]").is_visible() is has
+        assert page.locator("#numbers").is_visible() is has
+    alone = tmp_path / "alone.toml"
+    alone.write_text("[particle]\nradius = 0.01\nmass = 0.02\n[stream]\nat = [0.0, 0.5]\n"
+                     "velocity = [0.0, 0.0]\n[run]\nuntil = 0.5\n")  # fmt: skip
+    page = shown(alone)
+    page.evaluate("chutelab.lab.seek(0.4)")
+    fallen = 1e3 * 0.5 * 0.02 * (9.81 * 0.4) ** 2
+    told = page.locator("#energy tr[data-id=potential] td")
+    playwright.expect(told).to_have_text(f"\N{MINUS SIGN}{fallen:.1f} mJ")
+    assert "where the lowest particle is released" in page.locator("#energy").inner_text()
+
+
 def test_a_broken_law_is_told_below_the_picture(shown):
     """A sound run has no such line; one whose last knot is off has it, in the page's language."""
     page = shown("perpendicular", language="de")

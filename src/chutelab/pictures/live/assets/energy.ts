@@ -19,6 +19,9 @@ const KEPT: Record<string, string[]> = { spring: ["spring", "stiffness"], damper
 /** A residual below this part of the whole is rounding, and not shown. */
 const TINY_RESIDUAL = 1e-12;
 
+/** A work below this part of the whole, in a machine without drives, is not shown. */
+const TINY_WORK = 1e-9;
+
 /** J; less is shown as 0. */
 const UNSEEN = 5e-13;
 
@@ -49,6 +52,10 @@ class EnergyPanel {
   cells;
   rows;
   closes = html("p", { class: "good" });
+  zero = html("p", { class: "note" });
+  /** Whether any surface, or any belt, is driven. */
+  driven = false;
+  paid = false;
 
   constructor(home: Element, readonly lab: Lab, readonly words: Words) {
     this.bars = ["put-in", "is-now"].map((id) => html("div", { class: "bar", id }));
@@ -61,14 +68,19 @@ class EnergyPanel {
       html("span", {}, words.say("is-now")), this.bars[1]);
     const panel = card("energy", words.say("energy"), bars,
       html("table", {}, html("tbody", {}, ...this.rows)), this.closes,
-      html("p", { class: "note" }, words.say("energy-note")));
+      this.zero);
     home.append(panel);
-    // Moving surfaces give energy as belts do.
+    // Driven surfaces give energy as belts do.
     const given = this.rows[1].firstChild.lastChild;
     lab.on("run", () => {
       this.longest = 0;
-      const drives = lab.machine?.movers.length;
-      given.textContent = words.say(drives ? "energy-drives" : "energy-belt_work");
+      if (!lab.machine) return;
+      const { movers, segments, arcs } = lab.machine;
+      this.driven = movers.some(({ inertia, motor }) => !inertia || motor.some(Boolean));
+      this.paid = this.driven || [...segments, ...arcs].some(({ speed }) => speed);
+      given.textContent = words.say(this.driven ? "energy-drives" : "energy-belt_work");
+      const stands = segments.length || arcs.length;
+      this.zero.textContent = words.say(stands ? "energy-note" : "energy-note-free");
     });
     follow(lab, panel, ["time", "run"], () => this.refresh());
   }
@@ -97,6 +109,7 @@ class EnergyPanel {
     SIGNS.forEach(([name], n) => {
       this.cells.get(name).textContent = this.words.energy(ledger[name]);
       this.rows[n].hidden = (name === "residual" && isClosed)
+        || (name === "belt_work" && !this.paid && Math.abs(ledger[name]) < TINY_WORK * size)
         || (name === "push_work" && !recording.pushes.length && !ledger.push_work)
         || (KEPT[name] && ![...machine.movers, ...machine.joints].some((one: any) =>
           KEPT[name].some((key) => one[key])));

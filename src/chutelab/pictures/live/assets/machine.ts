@@ -176,16 +176,16 @@ export function build(scene: Scene): Machine {
 }
 
 /** Returns the height, m, at which the smallest particle lies at the lowest place that is still in
- * the scene, or is released, if that is lower. Boxes have no ends on sides to which gravity does
- * not pull. */
+ * the scene, or is released, if that is lower or there are no surfaces. Boxes have no ends on sides
+ * to which gravity does not pull. */
 function groundOf(releases: Release[], radius: number[], up: [number, number]) {
   const { EXIT_MARGIN: margin } = memory().layout.constants;
   const least = radius.reduce((one, other) => Math.min(one, other));
   return releases.reduce((ground, { x, y, exitBox }) => Math.min(ground, up[0] * x + up[1] * y,
-    up.reduce((height, share, n) => {
+    exitBox.some(isFinite) ? up.reduce((height, share, n) => {
       const end = share > 0 ? exitBox[n] + margin : exitBox[n + 2] - margin;
       return isFinite(end) ? height + share * end : height;
-    }, least)), Infinity);
+    }, least) : Infinity), Infinity);
 }
 
 /** Restitution that marks two kinds that pass through each other. */

@@ -69,6 +69,8 @@ class NumbersPanel {
   crowd;
   lead;
   asked;
+  panel;
+  none = false;
 
   constructor(home: Element, readonly lab: Lab, readonly words: Words) {
     this.body = html("tbody");
@@ -81,10 +83,17 @@ class NumbersPanel {
     const when = html("caption", { class: "note" }, words.say("numbers-when"));
     this.lead = html("table", { class: "crowd" }, when, this.crowd);
     this.asked = html("details", { class: "values" }, html("summary", {}, words.say("particle-0")));
-    const panel = card("numbers", words.say("numbers"), this.lead, this.asked, this.lone);
+    this.panel = card("numbers", words.say("numbers"), this.lead, this.asked, this.lone);
     this.asked.before(this.lone);
-    home.append(panel);
-    follow(lab, panel, ["run"], () => this.refresh());
+    home.append(this.panel);
+    // A machine that carries nothing anywhere has none of these numbers.
+    lab.on("run", () => {
+      if (!lab.machine || !lab.scene) return;
+      const { pulley, landing, releases } = lab.machine;
+      this.none = !pulley && landing < 0 && !lab.scene.plates.length;
+      this.panel.hidden = this.none && releases.length < FEWEST;
+    });
+    follow(lab, this.panel, ["run"], () => this.refresh());
   }
 
   refresh() {
@@ -110,6 +119,7 @@ class NumbersPanel {
         ...[simulated, analytic].map((value) =>
           html("td", {}, words.number(Math.abs(value) < ROUNDED ? 0 : tidy(value)))));
     }));
+    this.asked.hidden ||= this.none;
     this.simulated.textContent = many > 1 && !crowd ? words.say("simulated-mean", { n: many })
       : words.say("simulated");
     const why = reason ? words.say(`reason-${reason.text}`, Object.fromEntries(Object

@@ -261,7 +261,9 @@ class Stage {
     this.paths.replaceChildren();
     if (!recording || !this.show.trails || this.blind) return;
     const { envelopes = [] } = historyOf(this.lab) ?? {};
-    for (const { stream, lines } of envelopes) this.drawEnvelope(stream, lines);
+    // Paths on surfaces that move would go through where these are now.
+    const { pulley, movers } = recording.machine, stands = pulley || !movers.length;
+    for (const { stream, lines } of stands ? envelopes : []) this.drawEnvelope(stream, lines);
     if (envelopes.length) return;
     // The calculated flight is a double line; the run lies inside of it as long as the two
     // agree.

@@ -194,8 +194,10 @@ function boxOf(
   }
   for (const place of swept) widen(...place);
   if (!isFinite(box.left)) return EMPTY;
-  // Below a surface that vanishes, show where particles fall.
-  if (machine.segments.some(({ vanishes }) => isFinite(vanishes))) {
+  // Below a surface that vanishes, or swings away, show where particles fall.
+  const opens = machine.segments.some(({ vanishes }) => isFinite(vanishes))
+    || (!machine.pulley && machine.movers.some(({ inertia }) => inertia));
+  if (opens) {
     widen(box.left, box.bottom - FALL * (box.top - box.bottom));
   }
   const held = { ...box }, room = FALL * Math.max(box.right - box.left, box.top - box.bottom);

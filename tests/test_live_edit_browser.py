@@ -299,7 +299,7 @@ def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(
     page.click("#play")
     assert not page.evaluate("chutelab.lab.playing")
     is_hidden()
-    # It says what is to be done first, and the mark has the focus now.
+    # It says what is to be done first, and the flag has the focus now.
     assert "First your flag" in page.inner_text("#guess")
     assert page.evaluate("document.activeElement.getAttribute('aria-describedby')") == "guess"
     for _ in range(3):
@@ -323,7 +323,7 @@ def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(
     assert value(page, "gravity") == 1.62
     page.evaluate(DONE)
     is_hidden()
-    # With a finger, too: the mark is dragged to where it lands.
+    # With a finger, too: the flag is dragged to where it lands.
     x = landing_of(load("inclined-40", ["gravity=1.62"]))
     mark = page.locator(".guess .room").bounding_box()
     at = mark["x"] + mark["width"] / 2, mark["y"] + mark["height"] / 2

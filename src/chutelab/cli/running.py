@@ -471,7 +471,7 @@ def live(
     no browser, the command prints where the page is, with exit code 1.
 
     What the page offers is the [live] table of the scene: predict = true hides path and numbers
-    until the learner has set a mark; controls, panels, ranges and presets say what can be changed
+    until the learner has set a flag; controls, panels, ranges and presets say what can be changed
     and what is shown.
 
     chutelab live

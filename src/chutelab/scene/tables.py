@@ -523,7 +523,7 @@ class Live(Table):
     """Settings of the scene's live page. Engines ignore them."""
 
     predict: Switch = described(
-        False, "Whether path, landing and numbers are hidden until a mark is set and play pressed"
+        False, "Whether path, landing and numbers are hidden until a flag is set and play pressed"
     )
     controls: Keys | None = described(
         None, "Keys of the scene that can be changed in the page; default: all that have a handle"

@@ -35,6 +35,7 @@ from chutelab.classroom.lessons import (
     Lesson,
     LessonError,
     called_in,
+    machine_of,
     read,
     scene_of,
     shipped_folders,
@@ -43,7 +44,7 @@ from chutelab.classroom.lessons import (
 )
 from chutelab.classroom.lessons.sheets import asked, table, titled
 from chutelab.engines.simulation import judged
-from chutelab.scene import Fault, to_dict
+from chutelab.scene import Fault, Scene, to_dict
 from chutelab.util.files import aside, refuse_other, version_of, whole
 from chutelab.util.words import words
 
@@ -107,7 +108,9 @@ def build(
             animate(
                 recording, path, question=lesson.question, predict=True, comment=wanted, **settings
             )
-            still(recording, machine, width=lesson.picture.width, height=lesson.picture.height)
+            other = _marked(lesson)
+            begun = recording if other is None else judged(other)
+            still(begun, machine, width=lesson.picture.width, height=lesson.picture.height)
         if lesson.picture.split:
             split = path.with_name(SPLIT)
             split_velocity(recording, split)
@@ -147,19 +150,28 @@ def stamp_of(lesson: Lesson) -> str:
     That is a hash of the scene that is filmed and of the picture's settings, then the versions of
     all that simulates and draws.
     """
+    other = _marked(lesson)
     scene = to_dict(scene_of(lesson, lesson.picture.scene, lesson.picture.set))
+    machine = {} if other is None else {"machine": to_dict(other)}
     for hidden in ("expect", "live"):  # neither shows in its picture
-        scene.pop(hidden, None)
+        for one in (scene, *machine.values()):
+            one.pop(hidden, None)
     # Without defaults, which the version determines.
     settings = lesson.picture.model_dump(exclude_unset=True, exclude=NO_SETTINGS)
     inputs = {
         "scene": scene, "picture": settings, "question": lesson.question, "predict": True,
-        "language": lesson.language,
+        "language": lesson.language, **machine,
     }  # fmt: skip
     text = json.dumps(inputs, sort_keys=True, ensure_ascii=True)
     digest = hashlib.sha256(text.encode("ascii")).hexdigest()[:32]
     versions = ", ".join(f"{name} {version_of(name) or 'unknown'}" for name in LIBRARIES)
     return f"chutelab lesson; inputs {digest}; {versions}"
+
+
+def _marked(lesson: Lesson) -> Scene | None:
+    """Return the machine in whose picture a flag is set first, if it is not that of the film."""
+    step = next((one for one in lesson.steps if any(ask.mark for ask in one.asks)), None)
+    return machine_of(lesson, step) if step is not None and step.set else None
 
 
 def comment_of(picture: Path) -> str:

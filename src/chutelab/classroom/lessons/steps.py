@@ -65,7 +65,7 @@ SETTINGS: Final = 'a table of keys of the scene such as { "plate.angle_deg" = 20
 
 
 class Ask(Table):
-    """One question: answered by a mark in the picture, a choice, a sketch, or in words."""
+    """One question: answered by a flag in the picture, a choice, a sketch, or in words."""
 
     text: Markdown = key(..., "What is asked", "a text")
     mark: Said | None = key(

@@ -381,7 +381,8 @@ def draw_scale(ax: Axes) -> None:
         bar.set_data([x, x + length], [y, y])
         said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
         ends = ax.transData.transform([(x, y), (x + length, y)])
-        box = Bbox.union([said.get_window_extent(), Bbox(ends)])
+        # Particles ride right above a belt's line.
+        box = Bbox.union([said.get_window_extent(), Bbox(ends)]).padded(0.05 * ax.figure.dpi)
         crossed = sum(line.intersects_bbox(box, filled=False) for line in lines)
         return int(100 * box.count_overlaps(taken) + crossed)
 

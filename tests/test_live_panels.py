@@ -122,6 +122,33 @@ def test_with_joints_the_ledger_closes_at_any_time():
     assert ledgers[-1]["spring"] == pytest.approx(ours.spring[1], rel=1e-12)
 
 
+def test_hinges_are_in_the_ledger_beside_joints():
+    """A motor turns a bar at a steady rate: its work is that of lifting, and once ½ (m l²/3) w²."""
+    m, rate, begin, end = 0.2, np.radians(90.0), np.array([0.0, 0.0]), np.array([0.2, -0.06])
+    bar = {"from": begin.tolist(), "to": end.tolist(), "hinge": [0.0, 0.0], "mass": m}
+    flap = {**bar, "spring": 0.5, "damper": 0.01}
+    bar["motor"] = {"speed_deg": 90.0, "torque": 5.0}
+    scene = from_dict({
+        "particle": {"radius": 0.02, "mass": 0.1}, "run": {"until": 1.0},
+        "stream": [{"at": [-1.0, 0.3], "velocity": [0.0, 0.0]}],
+        "string": [{"from": [-0.9, 0.5]}],
+        "surface": [{**bar, "name": "bar"}, {**flap, "name": "flap", "hinge": [2.0, 0.0],
+                     "from": [2.0, 0.0], "to": [2.2, -0.06]}],
+    })  # fmt: skip
+    (answer,) = ask(scenes=[page_scene(scene)[0]])["runs"]
+    ours, its = chutelab.simulate(scene, engine="contact").ledger, answer["ledger"]
+    # After a quarter turn the middle is at half of (0.06, 0.2).
+    lifted = m * 9.81 * 0.5 * (0.2 + 0.06)
+    turning = 0.5 * m * (end**2).sum() / 3.0 * rate**2
+    assert its["belt_work"] == pytest.approx(lifted + turning, rel=1e-3)
+    off = 1e-11 * ours.turned_over
+    assert its["belt_work"] == pytest.approx(ours.drive_work, abs=off)
+    assert its["damper_loss"] == pytest.approx(ours.damper_loss, abs=off)
+    for entry in ("kinetic", "potential", "spring"):
+        assert its[entry] == pytest.approx(getattr(ours, entry)[1], abs=off), entry
+    assert abs(its["residual"]) < off
+
+
 @pytest.mark.parametrize("name", ["damper-plate", "see-saw", "flap-gate"])
 def test_what_hangs_is_in_the_ledger(runs, name):
     """Energies of hinges and springs, what dampers and stops take: as Python's ledger has them.

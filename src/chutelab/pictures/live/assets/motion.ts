@@ -22,6 +22,8 @@ class Swings {
   /** The states before and after a time, and the share of the interval that has passed. */
   around(t: number): [number[], number[], number] {
     const { rows } = this;
+    // A motor may give a blow at the first instant; the run begins before it.
+    if (t <= rows[0][0]) return [rows[0], rows[0], 1];
     let low = 0, high = rows.length - 1;
     while (high - low > 1) {
       const middle = (low + high) >> 1;

@@ -525,10 +525,8 @@ class Recording {
     return total;
   }
 
-  /** The ledger of all released particles, and of hinges. */
-  ledger(t: number): Ledger {
-    const joined = this.joinedLedger(t);
-    if (joined) return joined;
+  /** The ledger of all released particles, from their tracks. */
+  tracksLedger(t: number): Ledger {
     const total: Ledger = {
       start: 0, kinetic: 0, potential: 0, belt_work: 0, push_work: 0, restitution_loss: 0,
       friction_loss: 0, residual: 0, spring: 0, damper_loss: 0,
@@ -541,8 +539,14 @@ class Recording {
     // In a track the work of pushes is part of that of drives.
     total.push_work = this.pushedAt(t, total.belt_work);
     total.belt_work -= total.push_work;
-    // It also includes the work of hinges on particles. The energy of hinges that does not come
-    // from motors came from contacts.
+    return total;
+  }
+
+  /** The ledger of all released particles, and of hinges. */
+  ledger(t: number): Ledger {
+    const total = this.joinedLedger(t) ?? this.tracksLedger(t);
+    // The work of drives includes that of hinges on particles. The energy of hinges that does not
+    // come from motors came from contacts.
     const [begun, hung] = [0, t].map((then) => this.hung(then));
     const kept = ({ kinetic, potential, spring }: Hung) => kinetic + potential + spring;
     total.start += kept(begun);

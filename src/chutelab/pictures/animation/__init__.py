@@ -382,7 +382,7 @@ def draw_scale(ax: Axes) -> None:
         said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
         ends = ax.transData.transform([(x, y), (x + length, y)])
         # Particles ride right above a belt's line.
-        box = Bbox.union([said.get_window_extent(), Bbox(ends)]).padded(0.05 * ax.figure.dpi)
+        box = Bbox.union([said.get_window_extent(), Bbox(ends)]).padded(0.12 * ax.figure.dpi)
         crossed = sum(line.intersects_bbox(box, filled=False) for line in lines)
         return int(100 * box.count_overlaps(taken) + crossed)
 

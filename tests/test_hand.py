@@ -386,6 +386,20 @@ def test_lone_particles_go_on_together_and_do_not_meet():
     assert len(run.contacts) == 0
 
 
+@pytest.mark.parametrize("shape", [{}, {"shape": "box", "size": [0.04, 0.03], "radius": None}])
+def test_what_goes_through_each_other_keeps_all_laws_when_it_is_loaded(tmp_path, shape):
+    stream = {"at": [0.0, 0.3], "velocity": [0.3, 0.0], "count": 3, "rate": 100.0}
+    tables = scene(surface=[FLOOR], stream=stream)
+    tables["particle"] = {k: v for k, v in (tables["particle"] | shape).items() if v is not None}
+    run = chutelab.start(tables)
+    run.step(1.0)
+    for whole in (run.recording, chutelab.simulate(tables, engine="contact")):
+        x = whole.at([0.05])[0][0, :, 0]
+        assert np.abs(np.diff(x)).max() < R
+        assert not whole.laws
+        assert not Recording.load(whole.save(tmp_path / "run.npz")).laws
+
+
 @pytest.mark.parametrize(
     ("key", "value", "what"),
     [

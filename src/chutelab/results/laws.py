@@ -280,7 +280,8 @@ def _lay_out(module: core.Module, recording: Record) -> None:
     events = recording.events.view(_NUMBERS)
     unreal = sum(int(np.count_nonzero(~np.isfinite(events[name]))) for name in ("t", "rest"))
     interact = machine.interact or len(recording.swings) + len(recording.totals) > 0
-    passing = (machine.pair_restitution[: None if interact else 0] < 0.0).astype(INTEGER)
+    # Particles that do not meet may have run together: then all of them pass each other.
+    passing = (machine.pair_restitution[: None if interact else 0] < 0.0) | (not machine.interact)
     laws: Any = module.structs["Laws"]
     laws.particle_count, laws.piece_count = count, rows.shape[-1]
     laws.knot_count, laws.row = len(recording.knots), recording.knots.dtype.itemsize // 8
@@ -310,7 +311,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         module.fill("Laws", angles=recording.angle, outlines=outlines.ravel())
     module.fill(
         "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
-        passing=passing.ravel(), barriers=rows.reshape(-1), books=books,
+        passing=passing.astype(INTEGER).ravel(), barriers=rows.reshape(-1), books=books,
     )  # fmt: skip
 
 

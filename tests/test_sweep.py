@@ -169,10 +169,11 @@ def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
     assert np.isfinite(swept.columns["landing.x.mean"]).sum() > 100
 
 
-def test_a_batch_keeps_the_ends_of_rides_and_nothing_once_it_is_read():
-    """Knots inside a ride round the spoon are those far from all places of events."""
-    block = block_of(load("spoon", "stream.count=3"), ["incoming.speed=1.98,2.0"])
-    found = runs(block)
+@pytest.mark.parametrize("leaves", [False, True])
+def test_a_batch_keeps_the_ends_of_tracks_and_nothing_once_it_is_read(leaves):
+    """Of what misses the belt also the places of events, from which rides are far."""
+    scene = load("spoon", ["stream.count=3", *["outgoing.start=3"] * leaves])
+    found = runs(block := block_of(scene, ["incoming.speed=1.98,2.0"]))
     _, batch = next(found)
     alone = [recording for _, recording in runs(block, apart=True)]
     for n, track in enumerate(map(batch.track, range(6))):
@@ -180,6 +181,7 @@ def test_a_batch_keeps_the_ends_of_rides_and_nothing_once_it_is_read():
         places = events["position"][events["particle"] == n % 3]
         near = np.hypot(*(whole["position"][:, None] - places).T).min(axis=0) < 1e-4
         assert 4 * near.sum() < len(whole)
+        near[1:-1] &= leaves
         for name in ("t", "position", "velocity", "entries"):
             assert track[name] == pytest.approx(whole[name][near], rel=1e-12, abs=1e-14)
     assert next(found, None) is None

@@ -36,8 +36,8 @@
 /* Greatest number of knots and events that a round writes. */
 #define ROUND_KNOTS 400
 #define ROUND_EVENTS 32
-/* KEPT for a family of which inner knots are dropped. */
-#define BRIEFLY_KEPT (4 * KEPT)
+/* Number of knots and events for which room is made at first in a family, of which a few particles run at a time. */
+#define BRIEFLY 2000
 
 Exact E;
 Particle A;
@@ -96,6 +96,7 @@ static void bear_since(int surface, double nx, double ny, double depth) {
 
 /* The same of a particle that has gone round a circle: the normal is that in the middle. */
 static void bear_round(int surface, double x, double y, double rho, double depth) {
+    if (!(B.every > 0.0)) return;
     double mx = A.x + A.told[1] - 2.0 * x, my = A.y + A.told[2] - 2.0 * y, away = copysign(length_of(mx, my), rho);
     bear_since(surface, mx / away, my / away, depth);
 }
@@ -933,8 +934,8 @@ EXPORT int lay_out_exact(void) {
     RESERVE(E.lones, E.lone_count);
     RESERVE(E.books, 3.0 * E.surface_count * (E.apart ? E.lone_count : 1));
     E.room_size = 100 * (E.segment_count + E.arc_count) + 200;
-    E.knot_room = (int)many + 500;
-    E.event_room = (int)many + 100;
+    E.knot_room = E.brief ? BRIEFLY : (int)many + 500;
+    E.event_room = E.brief ? BRIEFLY : (int)many + 100;
     RESERVE(E.room, E.room_size);
     E.knots = set_apart(E.knot_room, sizeof *E.knots);
     E.events = set_apart(E.event_room, sizeof *E.events);
@@ -944,7 +945,6 @@ EXPORT int lay_out_exact(void) {
 /* Run the particles before `end` for at most so many rounds, which are counted down; return why it stopped, see `enum
    Course`. */
 int follow_some(int end, int *rounds) {
-    int kept = E.brief ? BRIEFLY_KEPT : KEPT;
     if (B.every > 0.0 && !B.bins && !lay_out_bins(E.surface_count)) return NO_MEMORY;
     for (; E.lone < end; E.lone++, E.begun = 0) {
         int member = member_of(E.lone);
@@ -957,11 +957,11 @@ int follow_some(int end, int *rounds) {
         }
         do {
             if (E.knot_room - E.knot_count < ROUND_KNOTS) {
-                if (E.knot_room > kept) return FILLED;
+                if (E.knot_room > KEPT) return FILLED;
                 if (!STRETCH(E.knots, E.knot_count, E.knot_room)) return NO_MEMORY;
             }
             if (E.event_room - E.event_count < ROUND_EVENTS) {
-                if (E.event_room > kept) return FILLED;
+                if (E.event_room > KEPT) return FILLED;
                 if (!STRETCH(E.events, E.event_count, E.event_room)) return NO_MEMORY;
             }
             if (!(*rounds)--) return PAUSING;

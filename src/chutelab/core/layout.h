@@ -691,7 +691,7 @@ typedef struct {
     int knot_room, event_room, room_size;
     int each, apart;        /* [in] particles of a member, 0 without a family; each has books of its own */
     int is_whole;           /* [in] all knots and events are still here: the host has taken none */
-    int brief;              /* [in] a family is judged as it runs, and inner knots are dropped then */
+    int brief;              /* [in] a family is judged as it runs, and most of its knots are dropped then */
     int until, landing;     /* [in] enum Until; surface that a particle lands on, or -1 */
     int most, window;       /* [in] greatest number of rounds of a particle; progress check interval, in rounds */
     double tick;            /* [in] s, divided by the pace; mean time between events below which there is no progress */

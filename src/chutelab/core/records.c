@@ -27,7 +27,6 @@ static void take_knots(const Knot *knots, int count) {
 /* Count the numbers of events that are not finite. Numbers times zero are zero only if all are finite: ten of them are
    checked in pairs, then the last two. */
 PAIRED static void take_events(const Event *events, int count) {
-    L.unreal = 0;
     for (const Event *e = events; e < events + count; e++) {
         const double *all = &e->t, *last = &e->tangent;
         Two sum = (two_at(all) + two_at(all + 2)) + (two_at(all + 4) + two_at(all + 6)) + (two_at(all + 8) + two_at(last - 1));
@@ -41,9 +40,8 @@ static char *put(char *to, const void *from, int size) {
     return to + size;
 }
 
-/* Convert events to rows of `results.EVENT`, in place: these have no padding. Return the number of bytes. */
-EXPORT int pack_events(Event *events, int count) {
-    char *to = (char *)events;
+/* Convert events to rows of `results.EVENT`, which have no padding, and may take their place. Return where these end. */
+static char *put_events(char *to, const Event *events, int count) {
     for (int n = 0; n < count; n++) {
         const Event e = events[n];
         const signed char kind = e.kind;
@@ -59,14 +57,13 @@ EXPORT int pack_events(Event *events, int count) {
         to = put(to, e.after + 2, 8);
         to = put(to, &e.normal, 16);
     }
-    return (int)(to - (char *)events);
+    return to;
 }
 
-/* Convert knots to rows of `results.KNOT`, in place. */
-EXPORT int pack_knots(Knot *knots, int count) {
-    char *to = (char *)knots;
-    for (int n = 0; n < count; n++, to += offsetof(Knot, disk)) memmove(to, knots + n, offsetof(Knot, disk));
-    return count;
+/* The same in place; return the number of bytes. */
+EXPORT int pack_events(Event *events, int count) {
+    char *begin = (char *)events;
+    return (int)(put_events(begin, events, count) - begin);
 }
 
 static void end_events(Event *events, int count) { room()->packed = pack_events(events, count); }
@@ -123,14 +120,41 @@ static int take_machine(const Exact *e) {
 
 static void take_counts(const Exact *e) {
     L.contacts = e->contacts, L.steps = e->rounds;
-    take_events(e->events, e->event_count);
 }
 
 static int judge_exact(const Exact *e) {
     if (!take_machine(e)) return 0;
     take_counts(e);
+    take_events(e->events, e->event_count);
     take_knots(e->knots, e->knot_count);
     return end_up();
+}
+
+/* What is kept of a family that is judged as it runs: rows of `results.KNOT` and `results.EVENT`. */
+static struct { char *knots, *events; int knot_count, event_count, knot_room, event_room; } Kept;
+
+/* Number of particles of a family that are followed, then judged. */
+#define SOME 8
+/* Number of bytes of a row of `results.KNOT`, which is the beginning of a `Knot`, and of one of `results.EVENT`. */
+#define KNOT_SIZE ((int)offsetof(Knot, disk))
+#define EVENT_SIZE 99
+
+/* Double the room of rows until there is some for `more` of them; return whether there is. */
+static int make_room(char **rows, int *room, int count, int more, int size) {
+    while (*room - count < more) {
+        char *wider = set_apart(2.0 * *room, size);
+        if (!wider) return 0;
+        memcpy(wider, *rows, (unsigned long)count * size);
+        *rows = wider, *room *= 2;
+    }
+    return 1;
+}
+
+static int begin_briefly(const Exact *e) {
+    int knots = 4 * e->lone_count, events = 10 * e->lone_count;
+    Kept.knot_count = Kept.event_count = 0, Kept.knot_room = knots, Kept.event_room = events;
+    Kept.knots = set_apart(knots, KNOT_SIZE), Kept.events = set_apart(events, EVENT_SIZE);
+    return take_machine(e) && RESERVE(L.offsets, L.particle_count + 1) && has_room();
 }
 
 /* Begin again, and keep all knots. */
@@ -140,35 +164,65 @@ static void begin_again(Exact *e) {
     L = (Laws){ .offsets = 0 };
 }
 
-/* Judge the particles that have ended, and drop their inner knots; return whether nothing stands out. */
-static int judge_and_drop(Exact *e) {
-    int first = L.judged, k = L.offsets[first], count = k;
-    take_knots(e->knots, e->knot_count);
-    if (!judge_some(e->lone)) return 0;
-    for (int i = first; i < L.judged; i++) {
-        L.offsets[i] = count;
-        for (; k < L.offsets[i + 1]; k++)
-            if (!e->knots[k].inner) e->knots[count++] = e->knots[k];
+/* Keep the ends of the tracks of particles that have come where they should; of others also the knots between, but those
+   inside rides. */
+static void keep_knots(const Exact *e, int first) {
+    char *to = Kept.knots + (long)Kept.knot_count * KNOT_SIZE;
+    for (int i = first, k = 0; i < L.judged; i++) {
+        int begin = k, end = L.offsets[i + 1], reason = e->lones[i].reason;
+        int has_come = reason == HAS_LANDED || reason == HAS_SETTLED;
+        L.offsets[i] = Kept.knot_count;
+        for (; k < end; k++) {
+            if (k > begin && k < end - 1 && (has_come || e->knots[k].inner)) continue;
+            to = put(to, e->knots + k, KNOT_SIZE);
+            Kept.knot_count++;
+        }
     }
-    e->knot_count = L.offsets[L.judged] = count;
+    L.offsets[L.judged] = Kept.knot_count;
+}
+
+/* Judge the particles that have ended, and keep what is needed of them; return whether nothing stands out. */
+static int judge_and_keep(Exact *e) {
+    int first = L.judged;
+    take_knots(e->knots, e->knot_count);
+    take_events(e->events, e->event_count);
+    L.offsets[first] = 0;
+    if (!judge_some(e->lone)) return 0;
+    keep_knots(e, first);
+    put_events(Kept.events + (long)Kept.event_count * EVENT_SIZE, e->events, e->event_count);
+    Kept.event_count += e->event_count;
+    e->knot_count = e->event_count = 0;
     return 1;
 }
 
-/* Run a family, of which a few particles are judged at a time. If its laws cannot be judged without inner knots, it runs
-   again and keeps them. */
+/* Run a family, of which a few particles are judged at a time, while what they wrote is in the cache. If its laws cannot
+   be judged without inner knots, or there is too much to keep, it runs again and keeps them. */
 static int follow_briefly(Exact *e, int *rounds) {
-    if (!L.bodies && !(take_machine(e) && RESERVE(L.offsets, L.particle_count + 1))) return NO_MEMORY;
+    if (!L.bodies && !begin_briefly(e)) return NO_MEMORY;
     while (L.judged < e->lone_count) {
-        int course = follow_some(MIN(L.judged + WIDTH, e->lone_count), rounds);
+        int course = follow_some(MIN(L.judged + SOME, e->lone_count), rounds);
         if (course != FINISHED && course != FILLED) return course;
-        if (course == FILLED || !judge_and_drop(e)) {
+        int knots = Kept.knot_count + e->knot_count, events = Kept.event_count + e->event_count;
+        if (course == FILLED || MAX(knots, events) > 4 * KEPT) {
+            begin_again(e);
+            return FINISHED;
+        }
+        if (!make_room(&Kept.knots, &Kept.knot_room, Kept.knot_count, e->knot_count, KNOT_SIZE)
+            || !make_room(&Kept.events, &Kept.event_room, Kept.event_count, e->event_count, EVENT_SIZE))
+            return NO_MEMORY;
+        if (!judge_and_keep(e)) {
             begin_again(e);
             return FINISHED;
         }
     }
     take_counts(e);
     if (!RESERVE(L.breaches, BREACHES)) return NO_MEMORY;
-    if (!judge_rest()) begin_again(e);
+    if (!judge_rest()) {
+        begin_again(e);
+        return FINISHED;
+    }
+    e->knots = (Knot *)Kept.knots, e->knot_count = Kept.knot_count;
+    e->events = (Event *)Kept.events, e->event_count = Kept.event_count, room()->packed = Kept.event_count * EVENT_SIZE;
     return FINISHED;
 }
 
@@ -182,7 +236,7 @@ EXPORT int follow_and_judge(void) {
         course = follow_some(e->lone_count, &rounds);
         if (course == FINISHED && e->is_whole && !judge_exact(e)) course = NO_MEMORY;
     }
-    if (course == FINISHED && e->is_whole) end_events(e->events, e->event_count);
+    if (course == FINISHED && e->is_whole && !e->brief) end_events(e->events, e->event_count);
     return course;
 }
 

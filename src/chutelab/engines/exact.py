@@ -98,8 +98,9 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
 def lent(machine: Machine) -> Iterator[Record]:
     """Run a family; its record lies in the core's memory, and is valid within the context only.
 
-    `Record.by_surface` is (N, S, 3), entries of each particle, and tracks have no knots inside
-    rides round circles. Raises what `run` does.
+    `Record.by_surface` is (N, S, 3), entries of each particle. Tracks of particles that landed or
+    settled have only their ends, others no knots inside rides round circles. Raises what `run`
+    does.
     """
     module = borrow()
     recorder = Recorder(machine, apart=True, turned=machine.tilt != 0.0, lent=True)
@@ -254,7 +255,6 @@ def drain(module: Module, recorder: Recorder) -> None:
     if recorder.lent and exact.brief:
         offsets = module.array("offsets", INTEGER, exact.lone_count + 1, of="Laws")
         owners = np.repeat(np.arange(exact.lone_count), np.diff(offsets))
-        module.call("pack_knots", exact.knots, exact.knot_count)
         recorder.add(owners, module.array("knots", KNOT, exact.knot_count, of="Exact"))
     elif exact.knot_count:
         rows = module.array("knots", dtype("Knot"), exact.knot_count, of="Exact")

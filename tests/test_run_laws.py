@@ -101,6 +101,25 @@ def in_memory(tables, engine, change):
     return recording
 
 
+@pytest.mark.parametrize("tables", [HOP, BOWL, TRANSFER])
+@pytest.mark.parametrize(("sunk", "wrong"), [(0.0, ""), (2.0, laws.ENERGY), (nan, laws.FINITE)])
+def test_a_lone_run_is_judged_by_its_scene_as_by_the_parts_of_its_machine(tables, sunk, wrong):
+    def sink(knots):
+        knots["position"][-1, 1] -= sunk
+
+    told = spoilt(recorded(tables, "pymunk"), knots=sink)
+    passed = replace(told, machine=replace(told.machine))
+    assert told.machine.is_told
+    assert not passed.machine.is_told
+    here, handed = laws.examine(told), laws.examine(passed)
+    assert here.breaches.tobytes() == handed.breaches.tobytes()
+    assert here.hits.tobytes() == handed.hits.tobytes()
+    for name, kind in here.figures._fields_:
+        if kind is not ctypes.c_uint32:  # those are addresses
+            assert getattr(here.figures, name) == getattr(handed.figures, name), name
+    assert (wrong in names(told)) == bool(wrong)
+
+
 @pytest.mark.parametrize("engine", ["exact", "contact"])
 @pytest.mark.parametrize("tables", [HOP, BOWL, TRANSFER])
 @pytest.mark.parametrize(("sunk", "wrong"), [(0.0, ""), (2.0, laws.ENERGY), (nan, laws.FINITE)])

@@ -26,13 +26,13 @@ EXPORTS = (
     "lay_out_plan", "build", "drawing", "draw", "exact", "lay_out_exact", "follow_and_judge",
     "run_exact", "run_world", "loads", "lay_out_bins", "laws", "lay_out_laws", "judge", "opened",
     "sine", "cosine", "angle_of", "angle_of_cosine", "push_disk", "turn_hinge", "steer",
-    "pack_events",
+    "pack_events", "judge_plan",
 )  # fmt: skip
 """What a host can call."""
 
 PYTHON = (
     "prepare_to_judge", "run_and_judge", "exact", "lay_out_exact", "follow_and_judge", "run_exact",
-    "run_world", "opened", "steer", "pack_events",
+    "run_world", "opened", "steer", "pack_events", "judge_plan",
 )  # fmt: skip
 """Of these what no page calls."""
 

@@ -14,6 +14,8 @@
 #define GREATEST 1e300
 /* m/s2; gravity for which bounds on speeds are written. */
 #define EARTH 9.81
+/* Numbers of a row of `results.KNOT`. */
+#define KNOT_ROW 9
 
 Exact *exact(void);
 int lay_out_exact(void);
@@ -23,6 +25,9 @@ int lay_out_world(void);
 int prepare_to_judge(void);
 int run_and_judge(void);
 Drawing *drawing(void);
+Laws *laws(void);
+int lay_out_laws(void);
+int judge(void);
 int build(void);
 int draw(void);
 
@@ -202,4 +207,41 @@ EXPORT int run_world(void) {
     int made = make_machine();
     if (made == ASIDE) return ASIDE;
     return made && take_up_world() ? run_and_judge() : LACKING;
+}
+
+/* Tell the laws the pieces of the plan's surfaces, the pulley last. */
+static void take_up_pieces(Barrier *to, const IncomingKeys *belt) {
+    for (const Segment *s = P.segments; s < P.segments + P.segment_count; s++)
+        *to++ = (Barrier){ .x = s->start[0], .y = s->start[1], .tx = s->tangent[0], .ty = s->tangent[1],
+                           .length = s->length, .speed = s->speed, .appears = s->appears,
+                           .vanishes = s->vanishes, .surface = s->surface, .one_sided = s->one_sided };
+    for (const Arc *a = P.arcs; a < P.arcs + P.arc_count; a++)
+        *to++ = (Barrier){ .x = a->center[0], .y = a->center[1], .radius = a->radius, .begin = a->begin,
+                           .extent = a->extent, .speed = a->speed, .appears = a->appears,
+                           .vanishes = a->vanishes, .surface = a->surface, .one_sided = a->one_sided };
+    if (P.incoming)
+        *to = (Barrier){ .radius = belt->pulley_radius, .extent = 2.0 * PI, .speed = belt->speed,
+                         .appears = -INFINITY, .vanishes = INFINITY };
+}
+
+/* Judge a run of a plan by an engine that is not here. It has one particle, whose knots and then the entries of all
+   surfaces end the plan's terms. Return 1, ASIDE if the host has to tell the machine, 0 if there is no memory. */
+EXPORT int judge_plan(void) {
+    Laws *l = laws();
+    int made = make_machine(), stream = 0, first = 0;
+    if (made != 1) return made;
+    Tables t = tables_of(0);
+    Released one = released(&t, 0, &stream, &first);
+    l->particle_count = 1, l->row = KNOT_ROW;
+    l->piece_count = P.segment_count + P.arc_count + P.incoming, l->pulley = P.incoming;
+    l->book_rows = l->surface_count = P.owners + 1;
+    l->tilt = t.scene->gravity_deg * RADIANS, l->largest = one.start->radius;
+    if (!lay_out_laws()) return 0;
+    l->books = P.rows + P.width + P.term_width - 3 * l->book_rows;
+    l->knots = l->books - KNOT_ROW * l->knot_count;
+    l->offsets[1] = l->knot_count;
+    *l->bodies = (Body){ .radius = one.start->radius, .mass = one.mass, .inertia = one.inertia,
+                         .gravity = t.scene->gravity };
+    take_up_pieces(l->barriers, t.incoming);
+    return judge();
 }

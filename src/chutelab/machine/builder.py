@@ -187,12 +187,15 @@ def _terms(scene: Scene) -> tuple[NDArray[Any], NDArray[Any]]:
     return own[:split].view(body), own[split:].view(pair).reshape(sizes["particles"], -1)
 
 
-def hand_over(module: Module, scene: Scene) -> None:
-    """Pass a scene to the core, which will build and run it."""
+def hand_over(module: Module, scene: Scene, more: bytes = b"") -> None:
+    """Pass a scene to the core, which will build it; with numbers that are to end its terms."""
     sizes, numbers = told(scene)
     plan = module.structs["Plan"]
     for name, size in sizes.items():
         setattr(plan, name, size)
+    if more:
+        numbers = np.frombuffer(numbers.tobytes() + more, REAL)
+        plan.term_width = len(numbers) - plan.width
     if not module.begin_with(numbers):
         module.work("lay_out_plan")
         module.fill("Plan", rows=numbers)
@@ -293,15 +296,15 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         else:
             firsts = np.ravel(grip)[:: family.each] if np.ndim(grip) else grip
             rows, nominal, movers = lay(module, family.firsts, firsts)
-            rows = {name: own.repeat(family.each, axis=0) for name, own in rows.items()}
         _weigh_hinges(scene, movers)
         warnings = _judged(scenes if family is None else family.firsts, nominal)
         releases, radius = draw(module, scenes, watch)
     finally:
         give_back(module)
+    each = 1 if family is None else family.each
     parts: dict[str, Any] = {
-        name: _pieces(kind, rows[name], met, kinds) if rows[name].size else _no_pieces(kind, kinds)
-        for name, kind in zip(rows, KINDS.values(), strict=True)
+        name: _pieces(kind, own, met, kinds, each) if own.size else _no_pieces(kind, kinds)
+        for (name, own), kind in zip(rows.items(), KINDS.values(), strict=True)
     }
     belt = scene.incoming
     until: Any = value(scene.run, "until")
@@ -407,15 +410,15 @@ Met = Sequence[Sequence[tuple[Any, Any]]]
 """Restitution and friction of each surface with each kind of particles; numbers or arrays (N,)."""
 
 
-def _pieces(kind: type[Pieces], rows: NDArray[Any], met: Met, kinds: int) -> Pieces:
-    """Return one kind of pieces from their rows, (S,) or in a family (N, S)."""
-    shape = rows.shape[:-1]
+def _pieces(kind: type[Pieces], rows: NDArray[Any], met: Met, kinds: int, each: int) -> Pieces:
+    """Return one kind of pieces from their rows, (S,) or in a family (V, S), `each` times."""
+    shape = tuple(count * each for count in rows.shape[:-1])
     given = rows.dtype.names or ()
     own = {name: rows[name] for name in kind.__dataclass_fields__ if name in given}
     if rows.ndim > 1:
         # Pieces of all members lie side by side and belong to the same surfaces.
         own = {
-            name: array[0].copy() if name == "surface" else array.T.copy().T
+            name: array[0].copy() if name == "surface" else array.T.repeat(each, axis=-1).T
             for name, array in own.items()
         }
     surface = own["surface"].astype(np.int64)
@@ -431,7 +434,7 @@ def _pieces(kind: type[Pieces], rows: NDArray[Any], met: Met, kinds: int) -> Pie
 @cache
 def _no_pieces(kind: type[Pieces], kinds: int) -> Pieces:
     """Return no pieces of a kind; there is nothing per scene then."""
-    return _pieces(kind, np.empty(0, dtype(kind.__name__.removesuffix("s"))), (), kinds)
+    return _pieces(kind, np.empty(0, dtype(kind.__name__.removesuffix("s"))), (), kinds, 1)
 
 
 def bodies(scenes: Scene | Family) -> tuple[list[Any], list[Any]]:

@@ -159,6 +159,9 @@ class Trigger(NamedTuple):
     by: int  # which surface is to be touched
 
 
+UPRIGHT = np.array(sin_cos(-0.0))
+"""The direction against gravity that points straight down."""
+
 EARTH = 9.81
 """m/s²; gravity for which the engines' bounds on speeds and times hold, see `pace_of`."""
 
@@ -219,6 +222,11 @@ class Machine:
         """Whether the machine is not built yet."""
         return "releases" not in vars(self)
 
+    @property
+    def is_told(self) -> bool:
+        """Whether its scene alone tells all of it to the core, as no part has been replaced."""
+        return "build" in vars(self)
+
     def finish(self, watch: Watch = unwatched) -> None:
         """Build the missing parts, see `chutelab.machine.build`."""
         if self.is_ahead:
@@ -257,7 +265,7 @@ class Machine:
     @cached_property
     def up(self) -> Floats:
         """The direction against gravity, (2,)."""
-        return np.array(sin_cos(-self.tilt))
+        return np.array(sin_cos(-self.tilt)) if self.tilt else UPRIGHT
 
     @cached_property
     def frame(self) -> Floats:

@@ -145,6 +145,7 @@ class Recorder:
     stopped = unsolved = triggered = NOTHING
     totals, lasting = np.empty(0, TOTAL), np.empty(0, LASTING)
     impulses = np.empty((0, 0), LOAD)
+    _taken = False  # whether events came from the core
 
     def __init__(
         self, machine: Machine, *, apart: bool = False, turned: bool = False, lent: bool = False
@@ -235,6 +236,7 @@ class Recorder:
     def take_events(self, packed: NDArray[np.uint8]) -> None:
         """Add events from the core, as bytes of rows of `EVENT`; the bytes are copied."""
         self._events.append(np.frombuffer(packed, EVENT))
+        self._taken = True
 
     def take_totals(self, rows: NDArray[Any]) -> None:
         """Take the core's totals of all steps, dtype ``Total``."""
@@ -250,9 +252,11 @@ class Recorder:
         friction_loss: float = 0.0,
     ) -> None:
         """Book ledger entries (J) on a particle and on the surface it met."""
-        entry = belt_work, restitution_loss, friction_loss
-        self.entries[particle] += entry
-        self.by_surface[surface] += entry
+        # A tuple would have to become an array, which takes three times as long.
+        for row in (self.entries[particle], self.by_surface[surface]):
+            row[0] += belt_work
+            row[1] += restitution_loss
+            row[2] += friction_loss
 
     def events(
         self,
@@ -340,7 +344,7 @@ class Recorder:
                     angle = np.insert(angle, offsets[lonely], angle[offsets[lonely]])
                 knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])
                 np.cumsum(np.where(sizes == 1, 2, sizes), out=offsets[1:])
-        one = len(self._events) == 1
+        lies_there = len(self._events) == 1 and self._taken
         events = _joined(self._events, EVENT)
         t = events["t"]
         # The exact engine has those of a family particle by particle, and there they stay.
@@ -350,7 +354,7 @@ class Recorder:
             in_turn = not np.count_nonzero(particle[1:] < particle[:-1])
             order = t.argsort(kind="stable") if in_turn else np.lexsort((particle, t))
             events = events.take(order)
-        elif one and not self.lent:
+        elif lies_there and not self.lent:
             # It may lie in the core's memory, so copy it, as bytes.
             events = np.array(events.view(np.uint8)).view(EVENT)
         if self._turned:
@@ -482,7 +486,11 @@ class Tracks:
     ) -> None:
         """Write a knot of the particle in a row, with the entries booked so far."""
         self.recorder.knot(self.first + i, t, x, v, omega, angle)
-        self.last[:, i], self.fresh[i] = (t, *x, *v, omega), True
+        self.note(i, (t, *x, *v, omega))
+
+    def note(self, i: int, state: tuple[float, ...]) -> None:
+        """Note the last knot of the particle in a row: t, x, v and ω."""
+        self.last[:, i], self.fresh[i] = state, True
 
     def step(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import atan2, inf, pi, sqrt
@@ -17,8 +18,15 @@ HAIR = 2e-11
 """Share of the radius by which a disk in the Space is larger than the particle, so that Chipmunk
 detects a contact when centre and surface are one radius apart. Levers have the same error."""
 
-NONE = (Vec2d.zero(), Vec2d.zero())
-"""Crowns of a face without ends."""
+
+def no_rims() -> tuple[Vec2d, Vec2d]:
+    """Return the crowns of a face without ends."""
+    return Vec2d.zero(), Vec2d.zero()
+
+
+def left_twice(along: Vec2d) -> tuple[Vec2d, Vec2d]:
+    """Return the crowns of a face that does not move along itself."""
+    return (along.perpendicular(),) * 2
 
 
 Place = tuple[float, float]
@@ -81,7 +89,12 @@ class Face:
     vanishes: float
     one_sided: int  # 1 if it is solid on its left, -1 if on its right; of an arc outside, inside
     spin: float  # angular velocity of a wheel, rad/s; rolling is relative to it
-    crowns: tuple[Vec2d, Vec2d]  # see `World._crown`; at the first end and at the last
+    rims: Callable[[], tuple[Vec2d, Vec2d]]  # see `Ends.crown`; at the first end and at the last
+
+    @cached_property
+    def crowns(self) -> tuple[Vec2d, Vec2d]:
+        """The `rims`, of which most runs need few."""
+        return self.rims()
 
     @cached_property
     def ends(self) -> tuple[Vec2d, ...]:

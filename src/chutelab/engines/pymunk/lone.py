@@ -10,7 +10,7 @@ comes to rest by 2 √(2 h/g)/(1 - ε) too early, some 1e-6 s.
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, cached_property
 from math import copysign, inf
 from operator import itemgetter
 from typing import Any, NamedTuple
@@ -111,7 +111,6 @@ class Lone:
         self, machine: Machine, world: World, recorder: Recorder, particle: int, report: Progress
     ) -> None:
         self.machine, self.world = machine, world
-        self.tracks = Tracks(recorder, world.radius, range(particle, particle + 1))
         self.entries = recorder.entries[particle]
         self.recorder, self.particle, self.report = recorder, particle, report
         start = machine.releases
@@ -131,6 +130,8 @@ class Lone:
         # The restitution of each surface that may be met in a step; its contacts.
         self.restitution: dict[Face, float] = {}
         self.contacts: list[Contact] = []
+        # The last knot, unless `tracks` knows it.
+        self.known: tuple[float, ...] = ()
         # The surface that it lies on, -1 for none; `Step.slips` there, None at the beginning.
         self.on = -1
         self.slipping: int | None = None
@@ -474,6 +475,9 @@ class Lone:
             alone = len(end.contacts) == 1
             gained = end.v - motion[0] - h * self.pull if alone else None
             self._bear(contact, end.middle, h, gained)
+        if self.known:
+            self.tracks.note(0, self.known)
+            self.known = ()
         if self.t > self.tracks.t[0]:
             state = np.array([before, (*self.x, *self.v, self.omega)])[:, :, None]
             self.tracks.step(np.array([True]), (self.t - h, self.t), state, entries)
@@ -516,8 +520,14 @@ class Lone:
 
     # What is written down
 
+    @cached_property
+    def tracks(self) -> Tracks:
+        """Its knots in lasting contact."""
+        return Tracks(self.recorder, self.r, range(self.particle, self.particle + 1))
+
     def _knot(self) -> None:
-        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+        self.recorder.knot(self.particle, self.t, self.x, self.v, self.omega)
+        self.known = self.t, *self.x, *self.v, self.omega
 
     def _end(self, reason: str, kind: Kind | None = None, surface: int = -1) -> None:
         """End the track, with an event of some kinds."""

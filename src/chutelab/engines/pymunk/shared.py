@@ -26,7 +26,7 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d, batch
 
-from chutelab.engines.pymunk.faces import NONE, Bend, Flight
+from chutelab.engines.pymunk.faces import Bend, Flight, no_rims
 from chutelab.engines.pymunk.moving import Moving, Rolling, Ties
 from chutelab.engines.pymunk.shapes import Shapes
 from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Carriage, World
@@ -126,7 +126,7 @@ class Shared:
         surface, self.speed, self.tx, self.ty = np.array(about).T
         self.surface = surface.astype(np.int64)
         # Directions of all rows at the first end and at the last, x and y.
-        self.crowns = np.array([NONE] * count + [face.crowns for face in faces])
+        self.crowns = np.array([no_rims()] * count + [face.crowns for face in faces])
         self.throws = (self.speed != 0.0) & (self.surface != machine.landing)
         self.spin = np.zeros(rows)
         self.spin[count:] = [face.spin for face in faces]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain
 from math import acos, ceil, cos, dist, inf, pi, sin, sqrt
 from typing import Any, NamedTuple
@@ -14,7 +14,17 @@ import pymunk
 from numpy.typing import ArrayLike
 from pymunk import Vec2d
 
-from chutelab.engines.pymunk.faces import HAIR, NONE, Bend, Face, Path, Place, length, nearest
+from chutelab.engines.pymunk.faces import (
+    HAIR,
+    Bend,
+    Face,
+    Path,
+    Place,
+    left_twice,
+    length,
+    nearest,
+    no_rims,
+)
 from chutelab.machine import Arcs, Machine, Segments
 from chutelab.results.loads import Bins
 from chutelab.results.recorder import Recorder
@@ -59,6 +69,73 @@ class Onward(NamedTuple):
     bend: float  # curvature, 1/m, positive to the left
 
 
+class Ends:
+    """The ends of all straight and bent pieces, and what continues from them.
+
+    Straight pieces are given by both ends (m) and their direction. Ends less than `hair` (m) apart
+    are at one place.
+    """
+
+    def __init__(self, lines: Sequence[Sequence[Any]], arcs: Arcs, hair: float) -> None:
+        self.lines, self.arcs, self.hair = lines, arcs, hair
+
+    def rims(self, start: list[float], end: list[float], along: Vec2d) -> tuple[Vec2d, Vec2d]:
+        """Return the crowns at both ends of a straight piece."""
+        return -self.crown(start, -along), self.crown(end, along)
+
+    def rim(self, end: list[float], out: Vec2d, bend: float) -> tuple[Vec2d, Vec2d]:
+        """Return the crown at an end of an arc, twice."""
+        return (self.crown(end, out, bend),) * 2
+
+    @cached_property
+    def _onward(self) -> tuple[list[float], list[Onward]]:
+        """The ends of all pieces by x (m), and what continues from them."""
+        found = list[Onward]()
+        for start, end, (x, y) in self.lines:
+            found += Onward(start, [x, y], 0.0), Onward(end, [-x, -y], 0.0)
+        if self.arcs.surface.size:
+            arcs = self.arcs.of(~self.arcs.whole)
+            for ends, ways, turn in zip(arcs.ends, arcs.inward, (1.0, -1.0), strict=True):
+                bends = (turn / arcs.radius).tolist()
+                found += map(Onward, ends.tolist(), ways.tolist(), bends)
+        found.sort(key=lambda one: one.end[0])
+        return [one.end[0] for one in found], found
+
+    def at(self, end: Sequence[float]) -> list[Onward]:
+        """Return the pieces that end at a place (m)."""
+        (places, found), x, hair = self._onward, end[0], self.hair
+        low, high = bisect_left(places, x - hair), bisect_left(places, x + 1.01 * hair)
+        return [one for one in found[low:high] if dist(one.end, end) <= hair]
+
+    def crown(self, end: Sequence[float], out: Vec2d, bend: float = 0.0) -> Vec2d:
+        """Return the direction to the middle of the rim that continues a left side.
+
+        Left as seen outward from a piece, which has the curvature `bend` (1/m) backward. At a free
+        end it is the left normal. Where other pieces end, a disk rolls round the end only in an
+        angle of more than π between two; all of that rim continues the faces of both.
+        """
+        near = self.at(end)
+        if len(near) == 1:
+            return out.perpendicular()
+        ways, bends = np.array([one.way for one in near]), np.array([one.bend for one in near])
+        dots, crosses = ways @ -np.array(out), ways[:, 0] * out.y - ways[:, 1] * out.x
+        turns, curls = np.arctan2(crosses, dots), bends - bend
+        alike = np.abs(turns) <= ALIKE
+        turns = np.where(alike, np.where(curls > 0.0, 0.0, 2.0 * pi), turns % (2.0 * pi))
+        others = np.flatnonzero(~alike | (np.abs(curls) > ALIKE * abs(bend)))
+        left = out.perpendicular()
+        if not len(others):
+            return left
+        low, high = others[turns[others].argmin()], others[turns[others].argmax()]
+        if turns[low] >= pi - ALIKE:
+            other, side = -Vec2d(*ways[low].tolist()), 1.0
+        elif turns[high] <= pi + ALIKE:
+            other, side = -Vec2d(*ways[high].tolist()), -1.0
+        else:
+            return left
+        return left - other.perpendicular() - side * (out + other)
+
+
 class World:
     """A Space with all surfaces of a machine, relative to `recorder.origin`.
 
@@ -81,21 +158,21 @@ class World:
         self.tiny, self.pace = max(TINY, self.rounding / r), float(machine.pace)
         self.dt = machine.step_of("pymunk")
         self.by_shape: dict[pymunk.Shape, Face] = {}
-        self.lines = [*zip(*ways, strict=True)]
-        for n, (start, end, along) in enumerate(self.lines):
+        self.ends = Ends([*zip(*ways, strict=True)], arcs, self.hair)
+        for n, (start, end, along) in enumerate(self.ends.lines):
             still, tangent = self._still(), Vec2d(*along)
             shape = pymunk.Segment(still, start, end, 0.0)
             about = self._about(parts, n)
-            crowns = (tangent.perpendicular(),) * 2
+            rims = partial(left_twice, tangent)
             if about["speed"]:
-                crowns = -self._crown(start, -tangent), self._crown(end, tangent)
-            self._add(Face(shape, tangent=tangent, crowns=crowns, **about))
+                rims = partial(self.ends.rims, start, end, tangent)
+            self._add(Face(shape, tangent=tangent, rims=rims, **about))
         if wheel is not None:
             turning = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
             turning.angular_velocity = -wheel.speed / wheel.radius
             about = self._about(wheel.rim, 0) | {"spin": turning.angular_velocity}
             rim = pymunk.Circle(turning, wheel.radius)
-            self._add(Face(rim, tangent=None, crowns=NONE, **about))
+            self._add(Face(rim, tangent=None, rims=no_rims, **about))
         if arcs.surface.size:
             sides = [zip(*pair, strict=True) for pair in zip(arcs.ends, arcs.inward, strict=True)]
             for n, (center, *ends) in enumerate(zip(arcs.center.tolist(), *sides, strict=True)):
@@ -134,18 +211,20 @@ class World:
         about["spin"] = -about["speed"] / radius
         if extent >= 2.0 * pi:
             about |= {"begin": 0.0, "extent": inf}
-            self._add(Bend(circle, tangent=None, foot=foot, crowns=NONE, **about))
+            self._add(Bend(circle, tangent=None, foot=foot, rims=no_rims, **about))
             return
         # rad; extension of the arc at an end, see `JOINT`, for the sharpest arc.
         more = sqrt(2.0 * JOINT * self.hair * float(arcs.radius.min())) / (radius + self.radius)
         # Whether another piece continues from the end, turning by less than that.
         before, after = (
-            more if any(dist(one.way, -inward) <= more for one in self._from(end.tolist())) else 0.0
+            more
+            if any(dist(one.way, -inward) <= more for one in self.ends.at(end.tolist()))
+            else 0.0
             for end, inward in ends
         )
         self._add(Bend(
             circle, tangent=None, foot=foot, begin=begin - before, extent=extent + before + after,
-            crowns=NONE, **about,
+            rims=no_rims, **about,
         ))  # fmt: skip
         # The outward direction is along the surface at the first end, against it at the last.
         for (place, inward), way in zip(ends, (1.0, -1.0), strict=True):
@@ -153,60 +232,13 @@ class World:
             still = self._still()
             point = pymunk.Circle(still, 0.0, end)
             out = Vec2d(*(-inward).tolist())
-            crown = self._crown(end, out, way / radius) if about["speed"] else out.perpendicular()
+            rims = partial(left_twice, out)
+            if about["speed"]:
+                rims = partial(self.ends.rim, end, out, way / radius)
             self._add(Face(
-                point, tangent=out, crowns=(crown, crown),
+                point, tangent=out, rims=rims,
                 **about | {key: about[key] * int(way) for key in ("speed", "one_sided")},
             ))  # fmt: skip
-
-    @cached_property
-    def _onward(self) -> tuple[list[float], list[Onward]]:
-        """The ends of all pieces by x (m), and what continues from them."""
-        found = list[Onward]()
-        for start, end, (x, y) in self.lines:
-            found += Onward(start, [x, y], 0.0), Onward(end, [-x, -y], 0.0)
-        arcs = self.machine.arcs
-        if arcs.surface.size:
-            arcs = arcs.of(~arcs.whole)
-            for ends, ways, turn in zip(arcs.ends, arcs.inward, (1.0, -1.0), strict=True):
-                bends = (turn / arcs.radius).tolist()
-                found += map(Onward, ends.tolist(), ways.tolist(), bends)
-        found.sort(key=lambda one: one.end[0])
-        return [one.end[0] for one in found], found
-
-    def _from(self, end: Sequence[float]) -> list[Onward]:
-        """Return the pieces that end at a place (m)."""
-        (places, found), x, hair = self._onward, end[0], self.hair
-        low, high = bisect_left(places, x - hair), bisect_left(places, x + 1.01 * hair)
-        return [one for one in found[low:high] if dist(one.end, end) <= hair]
-
-    def _crown(self, end: Sequence[float], out: Vec2d, bend: float = 0.0) -> Vec2d:
-        """Return the direction to the middle of the rim that continues a left side.
-
-        Left as seen outward from a piece, which has the curvature `bend` (1/m) backward. At a free
-        end it is the left normal. Where other pieces end, a disk rolls round the end only in an
-        angle of more than π between two; all of that rim continues the faces of both.
-        """
-        near = self._from(end)
-        if len(near) == 1:
-            return out.perpendicular()
-        ways, bends = np.array([one.way for one in near]), np.array([one.bend for one in near])
-        dots, crosses = ways @ -np.array(out), ways[:, 0] * out.y - ways[:, 1] * out.x
-        turns, curls = np.arctan2(crosses, dots), bends - bend
-        alike = np.abs(turns) <= ALIKE
-        turns = np.where(alike, np.where(curls > 0.0, 0.0, 2.0 * pi), turns % (2.0 * pi))
-        others = np.flatnonzero(~alike | (np.abs(curls) > ALIKE * abs(bend)))
-        left = out.perpendicular()
-        if not len(others):
-            return left
-        low, high = others[turns[others].argmin()], others[turns[others].argmax()]
-        if turns[low] >= pi - ALIKE:
-            other, side = -Vec2d(*ways[low].tolist()), 1.0
-        elif turns[high] <= pi + ALIKE:
-            other, side = -Vec2d(*ways[high].tolist()), -1.0
-        else:
-            return left
-        return left - other.perpendicular() - side * (out + other)
 
     def _still(self) -> pymunk.Body:
         """Return a body for a fixed surface; a shape that is not in the Space does not keep it."""

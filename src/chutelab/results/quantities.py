@@ -479,6 +479,8 @@ def measured(recording: Record, name: str) -> Floats:
                 # With one particle all statistics but the spread are its value.
                 return values - values if statistic == "spread" else values
             table, known = values.reshape(shape), (own & np.isfinite(values)).reshape(shape)
+            if known.all():
+                return np.asarray(_STATISTICS[statistic](np.ascontiguousarray(table), axis=1))
             found, counts = np.full(many, nan), known.sum(axis=1)
             # Variants in which as many particles have a value are rows of one table.
             for n in np.unique(counts[counts > 0]).tolist():

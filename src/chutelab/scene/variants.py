@@ -95,22 +95,24 @@ def varied(varies: Varied, kind: type[Vary]) -> list[Vary]:
         typed = f"vary {key}"
         if isinstance(values, str) or not hasattr(values, "__len__"):
             raise InputError(NUMBERS, typed)
-        read, unit = numbers(typed, [str(value) for value in plain(values)], NUMBERS)
+        read, unit = numbers(typed, plain(values), NUMBERS)
         # + 0.0: there is one zero.
         found.append(kind(key, tuple(number + 0.0 for number in read), typed, unit))
     return found
 
 
-def numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, ...], str]:
+def numbers(typed: str, parts: Sequence[Any], form: str) -> tuple[tuple[float, ...], str]:
     """Return numbers, with or without unit, in the SI unit, and that unit; "" without one.
+
+    Numbers are taken as they are, other parts are read as texts.
 
     Raises an `InputError` if one is not a number; its message has `form`, what is allowed.
     """
     values, units = [], set()
     for part in parts:
-        value, unit = read_any(part)
+        value, unit = (part, "") if type(part) is float else read_any(str(part))
         if not isfinite(value):
-            found = part.strip() or "nothing"
+            found = str(part).strip() or "nothing"
             raise InputError(f"{found} is not a number; it {form}{about_comma(found)}", typed)
         values.append(value)
         if unit or value != 0.0:

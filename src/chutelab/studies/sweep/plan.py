@@ -50,7 +50,7 @@ MOST_VARIANTS: Final = 1_000_000
 MOST_KEYS: Final = 20
 """Keys varied at once."""
 
-TOGETHER: Final = 12288
+TOGETHER: Final = 24576
 """Particles of the variants in a block that goes through the exact engine at once."""
 
 EXACT: Final = 16

@@ -193,7 +193,8 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
     # Particles, and the surfaces that each meets up to its landing.
     order = recording.which(Kind.IMPACT, Kind.LANDING, Kind.SETTLE)
     kind, surface, particle = recording.labels
-    order = order[sorted_by(particle[order], recording.count)]
+    if np.count_nonzero(particle[order[1:]] < particle[order[:-1]]):
+        order = order[sorted_by(particle[order], recording.count)]
     particle, surface, lands = particle[order], surface[order], kind[order] == Kind.LANDING
     landings = np.cumsum(lands) - lands
     kept = landings == landings[begins(particle, recording.count)]

@@ -260,6 +260,8 @@ class TestPredict:
              "outside the model: there is no incoming conveyor"),
             ({"plate": None, "outgoing": {"drop_from": "top"}},
              "outside the model: there is no damping plate"),
+            ({"plate": [{"name": "hung", "pivot": [0.6, 0.0]}], "outgoing": {"drop_from": "top"}},
+             "outside the model: the plate is placed by its pivot"),
             ({"outgoing": None}, "outside the model: there is no outgoing conveyor"),
             ({"stream": {"at": [-0.5, 0.105]}}, "outside the model: the release point"),
             ({"incoming": {"friction": 0.5}, "stream": {"velocity": [1.0, 0.0]}},

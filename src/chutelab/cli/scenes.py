@@ -368,7 +368,7 @@ def stress(scene: SceneName, *, engine: Engine, dt: float | None, set_: Texts, j
     """Run SCENE and judge the run by laws that it must keep, whatever the scene.
 
     No particle passes a surface, sinks into one or bounces where there is no surface; energy rises
-    only by a belt's work; ledger and momentum close. Each law that applies to the scene is a line,
+    only by drives; ledger and momentum close. Each law that applies to the scene is a line,
     with the value found and its bound. Laws that the engine does not promise for such a scene are
     listed with the reason. The exit code is 1 if a law is broken.
     """

@@ -337,7 +337,7 @@ class Crowd(Shown):
                 said = f"{number(self.whole_flow)} t/h, {self.width:g} m wide ({said})"
             notes.append(f"flow onto the belt: {said}")
         notes += [
-            f"{name}: half-way along its way, 96 % of the paths lie within {1e3 * size:.3g} mm"
+            f"{name}: half-way along, 96 % of its paths lie within {1e3 * round(size, 9):.3g} mm"
             for name, size in self.thick.items()
         ]
         heads = ("", *COLUMNS.values()) if rows else ()

@@ -268,7 +268,8 @@ def outside(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
     """Yield reasons why the scene is another problem than the paper's, like `not_carried`."""
     scene, own = scenes.scene, scenes.scene.particle
     yield scene.incoming is None, "there is no incoming conveyor"
-    yield scene.plate is None, "there is no damping plate"
+    yield not scene.plates, "there is no damping plate"
+    yield scene.plate is None, "the plate is placed by its pivot, not ahead of the belt"
     yield bool(own.outline), "it is about disks and spheres"
     rolls = scenes.value(own, "rolling_friction")
     yield np.logical_and(own.spin, np.greater(rolls, 0.0)), "rolling friction"

@@ -31,7 +31,7 @@ export function predict(scene: Scene, recording: Recording): Transfer {
   const { incoming: belt } = scene;
   const plate = scene.plates.find(({ pivot }) => pivot === undefined);
   if (belt === null || plate === undefined) {
-    const missing = belt === null ? "no-incoming" : "no-plate";
+    const missing = belt === null ? "no-incoming" : scene.plates.length ? "hung-plate" : "no-plate";
     return cutFrom(unanswered(), "separation", because("outside", missing));
   }
   const outside = recording.pushes.length ? "pushed" : outsideOf(scene, belt);

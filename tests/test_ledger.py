@@ -75,7 +75,7 @@ def test_without_belts_no_work_is_told_as_theirs():
     told = {row[0]: row[-1] for row in sheet.rows}
     assert told["plank"] == told["particles"] == ""
     first, last = recording.ends()
-    for name, m, k0, k1 in zip(("left", "right"), (0.008, 0.016), first, last, strict=True):
+    for name, m, k0, k1 in zip(("light", "heavy"), (0.008, 0.016), first, last, strict=True):
         spin = 0.5 * 0.5 * m * 0.01**2 * k1["omega"] ** 2
         gained = 0.5 * m * (k1["velocity"] ** 2).sum() + spin
         gained += m * G * (k1["position"][1] - k0["position"][1])

@@ -142,7 +142,7 @@ def test_balls_lie_on_the_plank_that_carries_them():
     drawn_lines = {str(one.get_gid()): np.asarray(one.get_xydata()) for one in ax.lines}
     start, end = drawn_lines["last plank"]
     along = (end - start) / np.hypot(*(end - start))
-    for gid, r in (("particle 0", 0.01), ("stream right", 0.01)):
+    for gid, r in (("particle 0", 0.01), ("stream heavy", 0.01)):
         (middle,) = drawn_lines[gid] - start
         # The distance from a straight line is the cross product with its direction.
         assert along[0] * middle[1] - along[1] * middle[0] == pytest.approx(r, rel=1e-3), gid

@@ -107,7 +107,7 @@ def figures(value: float, form: str = ".3g") -> str:
 
 
 def named(text: str) -> str:
-    """Return the name of a surface or stream; most are the same in every language."""
+    """Return the name of a surface; most are the same in every language."""
     return spoken().catalogue.get(f"picture-name-{text}", text)
 
 
@@ -302,7 +302,7 @@ def stream_handles(machine: Machine, *, all_of_them: bool = False) -> list[Line2
     hues = stream_colours(len(machine.streams))
     sizes = np.bincount(machine.releases.stream, minlength=len(hues))
     return [
-        Line2D([], [], ls="none", marker="o", ms=6.0, color=hue, label=plain(named(one)[:LONGEST]))
+        Line2D([], [], ls="none", marker="o", ms=6.0, color=hue, label=plain(one[:LONGEST]))
         for i, (one, hue) in enumerate(zip(machine.streams, hues, strict=True))
         if i or sizes[0] > 1 or all_of_them
     ]

@@ -50,22 +50,6 @@ def tables(seed: int) -> dict[str, Any]:
         return drawn
 
 
-def scaled(drawn: dict[str, Any], share: float) -> dict[str, Any]:
-    """Return a scene with all lengths times a share, and times and speeds as gravity has them."""
-    pace = share**0.5
-    by = {"radius": share, "from": share, "to": share, "center": share, "at": share,
-          "speed": pace, "velocity": pace, "until": pace}  # fmt: skip
-
-    def smaller(row: dict[str, Any]) -> dict[str, Any]:
-        return {
-            key: (np.array(value) * by[key]).tolist() if key in by else value
-            for key, value in row.items()
-        }
-
-    tables = {key: smaller(drawn[key]) for key in ("particle", "stream", "run")}
-    return {**drawn, **tables, "surface": [smaller(row) for row in drawn["surface"]]}
-
-
 def heading(degrees: float) -> tuple[float, float]:
     """Return a unit vector; that of whole quarter turns is exact."""
     quarters, rest = divmod(degrees, 90.0)

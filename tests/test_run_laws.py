@@ -34,6 +34,7 @@ from chutelab.scene import SceneError
 from chutelab.studies.sweep import sweep
 from shared import call, seeds
 from stress.case import TRANSFER, merged, surface, thrown
+from transformed import resized
 
 FLOOR = surface("floor", (-1.0, 0.0), (2.0, 0.0), restitution=0.5, friction=0.3)
 HOP = {**thrown((0.0, 0.3), (0.5, 0.0)), "surface": [FLOOR], "run": {"until": 1.0}}
@@ -407,7 +408,7 @@ def of_points(n):
 
 def of_millimetres(n):
     """Return a random machine of chains and bowls, a hundredth as large as they are drawn."""
-    return build(scene.from_dict(chains.scaled(chains.tables(n), 1e-2)))
+    return build(scene.from_dict(resized(chains.tables(n), 1e-2)[0]))
 
 
 LONE = "exact", "contact", "pymunk"
@@ -466,7 +467,7 @@ def test_hundreds_of_random_sound_scenes_raise_no_alarm(name, first):
 def test_where_heights_are_small_beside_other_lengths_rounding_is_no_alarm(share):
     """Hollows a little wider than the disk, and slides and blows on long slopes near y = 0."""
     for seed in (78, 139, 330, 420, 726, 932):
-        machine = build(scene.from_dict(chains.scaled(chains.tables(seed), share)))
+        machine = build(scene.from_dict(resized(chains.tables(seed), share)[0]))
         assert simulation.follow(machine, "exact", None).laws == (), seed
 
 
@@ -479,10 +480,10 @@ def test_what_rounding_may_do_to_a_ledger(size, share, seen):
     what the disk had and what was booked; its height is 0.3 at most.
     """
     floor = {"name": "floor", "from": [-1.0, 0.0], "to": [2.0, 0.0], "restitution": 0.5}
-    tables = chains.scaled(
+    tables = resized(
         {"gravity": 9.81, "particle": {"radius": 0.01, "mass": 0.01}, "surface": [floor],
          "stream": {"at": [0.0, 0.3], "velocity": [0.5, 0.0]}, "run": {"until": 1.0}}, size,
-    )  # fmt: skip
+    )[0]  # fmt: skip
     whole = recorded(tables)
     v2 = (whole.knots["velocity"] ** 2).sum(axis=1)
     booked = np.abs(whole.knots["entries"]).sum(axis=1)

@@ -1,0 +1,293 @@
+"""A run's result follows a transformation of its machine: mirrored, shifted, turned, scaled, ...
+
+Each machine is drawn, run, transformed and run again; the law of the transformation, undone, gives
+the first result. What rounding does grows as a push of 1e-9 grows. Where particles lie on
+something, the length of steps matters, and that depends on the frame a little: so machines are also
+run with other steps, all have to agree to the effect of these, and most to rounding.
+
+With all masses doubled or all times halved, results had the same bits in 700 draws (contact engine;
+9 of 10 with times halved in the exact one). With lengths scaled by 4 or 1/16 they had in two of
+three draws of boxes and nine of ten of others, mirrored in one of two and in nine of ten, turned by
+90 degrees in one of five and seven of ten. Nothing promises that, and nothing here asks for it.
+
+Contracts give some numbers in m/s: what is slower than 1e-3 sqrt(g / 9.81 m/s²) counts as calm. So
+times may be scaled freely where there is gravity, and lengths up to what such a speed decides.
+"""
+
+import copy
+from functools import cache, partial
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import chains
+import chutelab
+import oddities
+from chutelab.machine import build
+from chutelab.results import Kind
+from chutelab.scene import from_dict
+from sandbox import bodies
+from test_hinge import drawn as hung
+from transformed import Law, alone, mirrored, reordered, resized, scaled, shifted, turned, untwinned
+
+FAMILIES = {
+    "oddities": (oddities.tables, "contact"),
+    "bodies": (partial(bodies, both=True), "contact"),
+    "hinges": (hung, "contact"),
+    "bowls": (oddities.shaken_bowl, "contact"),
+    "chains": (chains.tables, "contact"),
+    "chains, exact": (chains.tables, "exact"),
+}
+"""Generators of scenes, and the engine that runs them."""
+
+PUSHES = (1e-9, 1e-6)
+"""m, m/s, rad and rad/s: the second finds what is decided within the first, such as which of two
+corners strikes first."""
+CALM, RESOLVED = 1e4, 0.01
+"""Times that a push may grow, and effect of another step, m and m/s; where either is more, half of
+the run is compared."""
+ROUNDING = 1e-11
+"""m and m/s; of coordinates of 1 m and speeds of 10 m/s, times some thousand operations."""
+STEPS = (0.77, 0.29)
+"""Shares of the usual step."""
+LOOSE, GROWS = 1e-2, 1e-5
+"""m, m/s, share of the energy: what a lasting contact may add at last, as where a body leaves a
+corner one step later, and what it may add earlier, which grows."""
+MOST = {"oddities": 0.9, "bodies": 0.8, "hinges": 0.8, "bowls": 0.65, "chains": 0.95,
+        "chains, exact": 0.95}  # fmt: skip
+"""Share of machines that have to agree to rounding. Turned by 37 degrees, when axes no longer go
+with boxes round things, a tenth fewer; doubled or hastened, all."""
+
+
+def doubled(tables):
+    """All masses times 2: forces, torques and energies are, too."""
+    return scaled(tables, mass=2.0)
+
+
+def hastened(tables):
+    """Times halved: gravity and accelerations four times as large."""
+    return scaled(tables, time=0.5, mass=0.5 if tables.get("air_density") else 1.0)
+
+
+TRANSFORMATIONS = {
+    "mirrored": mirrored,
+    "shifted": partial(shifted, by=(0.1, -0.3)),
+    "far away": partial(shifted, by=(64.0, -128.0)),
+    "turned by 90": partial(turned, by_deg=90.0),
+    "turned by 37": partial(turned, by_deg=37.0),
+    "hastened": hastened,
+    "doubled": doubled,
+    "four times as large": partial(resized, length=4.0),
+    "a sixteenth": partial(resized, length=0.0625),
+    "reordered": partial(reordered, seed=5),
+}
+
+
+def applies(name, tables):
+    """Whether a machine can be transformed so.
+
+    One-sided lines pass along an axis; the viscosity of air has the unit of mass / (length time);
+    without gravity speeds at rest do not go with times.
+    """
+    if name == "turned by 37":
+        return not any(row.get("passes") in ("up", "down") for row in tables["surface"])
+    if name == "hastened":
+        return tables.get("gravity", 9.81) > 0.0
+    return name != "doubled" or not tables.get("air_density")
+
+
+class State(NamedTuple):
+    """The end of a run, with a law undone; NaN of what has left."""
+
+    position: np.ndarray  # (N, 2), m
+    velocity: np.ndarray  # (N, 2), m/s
+    rim: np.ndarray  # (N, 1), m/s: how fast the rim turns
+    losses: np.ndarray  # (2,): belt work and losses as shares of the energy turned over
+
+
+def state(recording, law):
+    """Return the end of a run, as the law's first run should have it."""
+    order = list(law.order) if law.order else slice(None)
+    last = recording.knots[recording.offsets[1:] - 1]
+    left = recording.events["particle"][recording.events["kind"] == Kind.EXIT]
+    there = np.where(np.isin(np.arange(recording.count), left), np.nan, 1.0)[:, None]
+    entries = (there * last["entries"])[order]
+    book = np.stack([entries[:, 0], entries[:, 1] + entries[:, 2]], axis=1)
+    rim = recording.particle.radius * last["omega"]
+    speed = law.time / law.length
+    return State(
+        (there * (last["position"] - law.shift))[order] / law.length @ law.matrix,
+        (there * last["velocity"])[order] * speed @ law.matrix,
+        (there * rim[:, None])[order] * law.hand * speed,
+        np.nansum(book, axis=0) / max(recording.ledger.turned_over, 1e-300),
+    )
+
+
+def apart(one, other):
+    """Return the greatest difference of two states; of particles that stayed in both runs."""
+    differences = [np.abs(a - b) for a, b in zip(one[:3], other[:3], strict=True)]
+    stayed = all(np.isfinite(array).all() for array in (*one[:3], *other[:3]))
+    # An entry of what has left lacks its partner.
+    found = [np.nan_to_num(array).max(initial=0.0) for array in differences]
+    return max(*found, np.abs(one.losses - other.losses).max() if stayed else 0.0)
+
+
+def pushed(tables, by, random):
+    """Return a scene whose particles start elsewhere, at other speeds, by so much at most."""
+    found = copy.deepcopy(tables)
+    kinds = {row.get("name"): row for row in found["particle"]}
+    for row in found["stream"]:
+        row["at"] = (np.array(row["at"]) + random.uniform(-by, by, 2)).tolist()
+        row["velocity"] = (np.array(row["velocity"]) + random.uniform(-by, by, 2)).tolist()
+        kind = kinds.get(row.get("particle"), found["particle"][0])
+        if kind.get("spin"):
+            row["omega"] = row.get("omega", 0.0) + float(random.uniform(-by, by))
+        if kind.get("shape") in ("box", "polygon"):
+            turn = np.degrees(random.uniform(-by, by))
+            row["angle_deg"] = row.get("angle_deg", 0.0) + float(turn)
+    try:
+        build(from_dict(found))
+    except chutelab.SceneError:
+        # It touched a surface.
+        return pushed(tables, by, random)
+    return found
+
+
+class Drawn(NamedTuple):
+    """A machine that is not chaotic, and its run."""
+
+    tables: dict
+    end: State
+    broken: set
+    growth: float  # how many times a push grows, at least 1
+    step: float  # effect of another step
+
+
+@cache
+def drawn(family, seed):
+    """Return a machine of a family, run for as long as it is calm and resolved.
+
+    None if that is less than an eighth of its time. One of which particles wait for their place is
+    drawn anew: who is first depends on the order.
+    """
+    generator, engine = FAMILIES[family]
+    random = np.random.default_rng(seed)
+    run = partial(chutelab.simulate, engine=engine)
+    while True:
+        tables = alone(untwinned(generator(seed)))
+        try:
+            first = run(tables)
+        except chutelab.SceneError:
+            # Held between a surface that moves and another: not for the exact engine.
+            seed += 10_000
+            continue
+        starts = first.events["t"][first.events["kind"] == Kind.RELEASE]
+        if len(starts) == first.count and (starts == np.sort(first.machine.releases.t)).all():
+            break
+        seed += 10_000
+    for _ in range(4):
+        end = state(first, Law())
+        growth = [apart(state(run(pushed(tables, by, random)), Law()), end) / by for by in PUSHES]
+        others = [{**tables["run"], "dt": share * tables["run"]["dt"]} for share in STEPS]
+        step = [apart(state(run({**tables, "run": other}), Law()), end) for other in others]
+        if max(growth) < CALM and max(step) < RESOLVED:
+            broken = {law.law for law in first.laws}
+            return Drawn(tables, end, broken, max(1.0, *growth), max(step))
+        tables["run"]["until"] *= 0.5
+        first = run(tables)
+    return None
+
+
+def check(family, name, seeds):
+    """Run the machines of some seeds once more, transformed."""
+    off, count = {}, 0
+    for seed in seeds:
+        it = drawn(family, seed)
+        if it is None or not applies(name, it.tables):
+            continue
+        tables, law = TRANSFORMATIONS[name](it.tables)
+        try:
+            run = chutelab.simulate(tables, engine=FAMILIES[family][1])
+        except chutelab.SceneError as error:
+            if "it swings in less than 10 us" not in str(error):
+                raise
+            continue
+        count += 1
+        differs = apart(state(run, law), it.end)
+        assert {broken.law for broken in run.laws} <= it.broken
+        allowed = LOOSE + GROWS * it.growth + 3.0 * it.step
+        assert differs < allowed, (seed, differs, it.growth, it.step)
+        if differs > it.growth * ROUNDING:
+            off[seed] = differs
+    share = 1.0 if name in ("doubled", "hastened") else MOST[family] - 0.1 * ("37" in name)
+    # One more: of few it may be the first.
+    assert len(off) <= round((1.0 - share) * count) + (share < 1.0), off
+
+
+FEW = {"oddities": 8, "bodies": 4, "hinges": 3, "bowls": 1, "chains": 7, "chains, exact": 7}
+MANY = {"oddities": 100, "bodies": 40, "hinges": 24, "bowls": 8, "chains": 80, "chains, exact": 80}
+
+
+@pytest.mark.filterwarnings("ignore:LAW BROKEN")
+@pytest.mark.parametrize("name", TRANSFORMATIONS)
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_transformed_machine_runs_as_its_law_says(family, name):
+    check(family, name, range(FEW[family]))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:LAW BROKEN")
+@pytest.mark.parametrize("name", TRANSFORMATIONS)
+@pytest.mark.parametrize("family", FAMILIES)
+def test_many_transformed_machines_run_as_their_law_says(family, name):
+    check(family, name, range(FEW[family], MANY[family]))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_most_machines_are_compared(family):
+    """So that what is left out as chaotic does not hide what is wrong."""
+    assert np.mean([drawn(family, seed) is not None for seed in range(FEW[family])]) > 0.8
+
+
+@cache
+def crowd(seed):
+    """Return a bowl, 0.8 s long, and what is measured of its run."""
+    tables = alone(oddities.shaken_bowl(seed))
+    tables["run"]["until"] = 0.8
+    return tables, measured(chutelab.simulate(tables, engine="contact"), Law())
+
+
+def measured(recording, law):
+    """Return what chaos leaves of a crowd: mean place and spread, m, contacts, losses, residual."""
+    end = state(recording, law)
+    struck = np.isin(recording.events["kind"], (Kind.IMPACT, Kind.COLLISION)).sum()
+    centre = np.nanmean(end.position, axis=0)
+    spread = np.nanstd(end.position, axis=0)
+    return np.array([*centre, *spread, struck, *end.losses])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TRANSFORMATIONS)
+def test_a_transformed_crowd_is_the_same_crowd_on_average(name):
+    """Paths are other ones after some 0.3 s; over 24 crowds no mean differs by four errors."""
+    off = []
+    for seed in range(24):
+        tables, before = crowd(seed)
+        found, law = TRANSFORMATIONS[name](tables)
+        recording = chutelab.simulate(found, engine="contact")
+        assert abs(recording.ledger.residual) < 1e-9 * recording.ledger.turned_over
+        off.append(measured(recording, law) - before)
+    error = np.std(off, axis=0, ddof=1) / np.sqrt(len(off))
+    assert (np.abs(np.mean(off, axis=0)) <= 4.0 * error).all(), (np.mean(off, axis=0), error)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "more"), [("mirrored", "c.nx"), ("a sixteenth", "a->radius")])
+def test_restitution_that_depends_on_more_than_a_law_allows_is_told(name, more, with_fault):
+    """The planted fault: by 1e-4 of the normal's x, or 1e-4 of it for each metre of the radius."""
+    with_fault("impacts.c", "-c.rest * u[0]", f"-(1 + 1e-4 * {more}) * c.rest * u[0]")
+    drawn.cache_clear()
+    with pytest.raises(AssertionError):
+        check("oddities", name, range(24))
+    drawn.cache_clear()

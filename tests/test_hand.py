@@ -189,6 +189,7 @@ def test_what_is_done_to_random_machines_by_hand_keeps_all_laws(seed):
     for one in run.scene.surface:
         if one.motor:
             keys |= {f"surface.{one.name}.motor.{key}": 300.0 for key in ("torque", "speed_deg")}
+    poses = []
     while not run.done:
         for _ in range(random.integers(3)):
             force = 10.0 ** random.uniform(-3.0, 0.5) * random.normal(size=2)
@@ -200,7 +201,11 @@ def test_what_is_done_to_random_machines_by_hand_keeps_all_laws(seed):
             else:
                 run.push(int(random.integers(len(run.positions))), force)
         run.step(10.0 ** random.uniform(-4.0, -1.0))
+        poses.append((run.t, [run.pose(name) for name in run.scene.movers]))
     closes(run.recording)
+    for n, name in enumerate(run.scene.movers):
+        times, known = [t for t, _ in poses], np.array([found[n] for _, found in poses])
+        assert run.recording.pose(name, times) == pytest.approx(known, abs=1e-12)
 
 
 def test_what_hangs_is_pushed_by_a_torque_whose_work_is_torque_times_angle():

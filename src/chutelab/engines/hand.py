@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
 
@@ -20,6 +20,7 @@ from chutelab.engines.contact import MOST_STEPS, Job, pieces, together
 from chutelab.engines.simulation import must_fit, refused
 from chutelab.machine import build
 from chutelab.results import Recording
+from chutelab.results.record import must_move
 from chutelab.results.recorder import Recorder, StalledError
 from chutelab.scene import AnyScene, Overrides, load
 from chutelab.util.arrays import RADIANS, Floats
@@ -268,8 +269,20 @@ class Run:
         return found
 
     def pose(self, surface: str) -> Floats:
-        """Return the pose of a moving surface: x, y of its pivot, m, and its angle, rad, (3,)."""
-        pose: Floats = self.recording.pose(surface, self.t)[0]
+        """Return the pose of a moving surface: x, y of its pivot, m, and its angle, rad, (3,).
+
+        Raises an `InputError` if no surface of that name moves.
+        """
+        rows = self._module.array("movers", dtype("Mover"), self._module.world.mover_count)
+        names = [self._machine.surfaces[index] for index in rows["surface"]]
+        must_move(surface, names)
+        row, machine = rows[names.index(surface)], self._machine
+        known = {mover.surface: mover for mover in machine.movers}
+        mover = known.get(row["surface"]) or machine.steered(row["surface"])
+        pose = replace(mover, begins=row["begins"]).pose(self.t)
+        if mover.hinge is not None:
+            late = min(self.t, row["until"]) - row["since"] if row["steered"] else 0.0
+            pose[2] = row["angle"] + late * row["rate"]
         return pose
 
     @property

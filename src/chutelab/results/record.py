@@ -133,6 +133,13 @@ change of momentum of all of them.
 """
 
 
+def must_move(name: str, moving: list[str]) -> None:
+    """Raise an `InputError` if a surface is not among those that move."""
+    if name not in moving:
+        there = f"what moves is {', '.join(moving) or 'nothing'}"
+        raise InputError(did_you_mean(name, moving, there), "name", name)
+
+
 def balance(entries: NDArray[Any]) -> Floats:
     """Return the energy (J) from entries (..., 3): belt work less both losses."""
     return np.asarray(entries[..., 0] - entries[..., 1] - entries[..., 2])
@@ -526,9 +533,7 @@ class Record(Shown):
             If no surface of that name moves.
         """
         movers = {self.machine.surfaces[mover.surface]: mover for mover in self.machine.movers}
-        if name not in movers:
-            there = f"what moves is {', '.join(movers) or 'nothing'}"
-            raise InputError(did_you_mean(name, list(movers), there), "name", name)
+        must_move(name, list(movers))
         return movers[name].pose(np.atleast_1d(times))
 
     def blocks(self, times: Floats) -> Iterator[Cells]:

@@ -318,5 +318,6 @@ EXPORT int build(void) {
     Tables first = tables_of(0);
     lay_movers(&first);
     lay_out_drawing();
+    if (has_room()) draw_if_told();
     return has_room();
 }

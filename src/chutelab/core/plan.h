@@ -46,6 +46,7 @@ int is_moved(const Tables *t, int surface);
 
 /* releases.c */
 void lay_out_drawing(void);
+void draw_if_told(void);
 
 /* ride.c */
 int ride_to_pulley(double *w, double *z, double gap, double length, double gravity, double friction,

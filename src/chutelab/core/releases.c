@@ -320,3 +320,14 @@ EXPORT int draw(void) {
     }
     return DONE;
 }
+
+/* Draw right after the machines are built, if the host has said how many places may be checked, no machine contradicts
+   itself, and no corners have to be told before. */
+void draw_if_told(void) {
+    Tables t = tables_of(0);
+    double corners = 0.0;
+    for (int n = 0; n < P.particles; n++) corners += t.particles[n].corners;
+    int is_sound = D.looks > 0 && corners == 0.0;
+    for (int n = 0; n < P.members && is_sound; n++) is_sound = P.nominal[n].contradiction == SOUND;
+    if (is_sound) draw();
+}

@@ -30,7 +30,7 @@ from chutelab.machine.parts import (
     Trigger,
     pace_of,
 )
-from chutelab.machine.releases import RefusedError, draw
+from chutelab.machine.releases import LOOKS, RefusedError, draw
 from chutelab.machine.shapes import KINDS, Pieces
 from chutelab.scene import Fault, Plate, Scene
 from chutelab.scene.conflicts import JOINTS
@@ -206,6 +206,8 @@ def lay(
 ) -> tuple[dict[str, NDArray[Any]], NDArray[Any], tuple[Mover, ...]]:
     """Have the core build the surfaces of a scene, or of all N scenes of a family.
 
+    If no corners have to be told before, it also draws the releases, or begins to.
+
     Returns
     -------
     parts : dict of ndarray, (S,) or (N, S)
@@ -231,6 +233,7 @@ def lay(
             rows[:, column] = numbers[column]
     else:
         hand_over(module, scene)
+    module.structs["Drawing"].looks = LOOKS
     module.work("build")
     plan = module.structs["Plan"]
 

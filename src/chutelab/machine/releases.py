@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.core import INTEGER, Module, Status, constants, dtype
+from chutelab.core import INTEGER, Module, constants, dtype
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.scene.variants import Family
 from chutelab.util.arrays import RADIANS, Bools, Floats, Ints, Numbers, Watch, sin_cos
@@ -149,11 +149,11 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
     corners = [corner for kind in scene.particles for corner in kind.outline]
     members, streams = module.structs["Plan"].members, len(counts)
     drawing = module.structs["Drawing"]
-    drawing.looks = LOOKS
     if corners:
         module.fill("Drawing", corners=np.array(corners).reshape(-1))
-    while Status(module.call("draw")) is Status.PAUSED:
+    while drawing.member < members:
         watch()
+        module.call("draw")
 
     def array(name: str, kind: np.dtype[Any], each: int) -> Any:
         return module.array(name, kind, members * each, of="Drawing")

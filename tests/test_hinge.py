@@ -4,6 +4,7 @@ Formulas are written here; quadratures, roots and one ODE are SciPy's.
 """
 
 from dataclasses import replace
+from itertools import product
 from math import cos, exp, pi, radians, sin, sqrt
 
 import numpy as np
@@ -417,6 +418,67 @@ def test_a_pair_of_blow_and_friction_that_feel_each_other_gives_no_energy():
         recording = run(stream, hinge=[0.2 + x, y], **keys)
         assert recording.ledger.friction_loss >= -1e-15
         assert recording.ledger.restitution_loss == pytest.approx(0.0, abs=1e-15)
+
+
+def blow_on_lever(u, by, mu, arm, e):
+    """Return the impulses of a blow, with friction, rolling friction and whether both were reduced.
+
+    `by` says how they change normal velocity, slip and relative rotation. Of the nine ways in which
+    both stop or act at their bounds, one is consistent. If it creates energy, both are smaller.
+    """
+    found = []
+    for slide, turn in product((-1, 0, 1), repeat=2):
+        rows, right = by.copy(), np.array([-(1.0 + e) * u[0], -u[1], -u[2]])
+        for n, way, bound in ((1, slide, mu), (2, turn, arm)):
+            if way:
+                rows[n], right[n] = -way * bound * np.eye(3)[0] + np.eye(3)[n], 0.0
+        j = np.linalg.solve(rows, right)
+        after = u + by @ j
+        fits = abs(j[1:]) <= np.array([mu, arm]) * j[0] * (1.0 + 1e-9)
+        opposes = [way * after[n] <= 1e-12 for n, way in ((1, slide), (2, turn))]
+        if j[0] >= 0.0 and fits.all() and all(opposes):
+            found.append(j)
+    assert found
+    assert all(np.allclose(one, found[0]) for one in found)
+
+    def work(share):
+        j = np.append(0.0, share * found[0][1:])
+        j[0] = (-(1.0 + e) * u[0] - by[0] @ j) / by[0, 0]
+        return j, j[1:] @ (u + 0.5 * by @ j)[1:]
+
+    if work(1.0)[1] <= 1e-15:
+        return found[0], False
+    least = 1e-9
+    share = brentq(lambda s: work(s)[1], least, 1.0) if work(least)[1] < 0.0 else 0.0
+    return work(share)[0], True
+
+
+def test_a_disk_that_rolls_on_a_light_lever_is_struck_once_and_gives_no_energy():
+    """Normal impulse, friction and rolling friction act on each other through the lever."""
+    reduced = 0
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        pivot, at = random.uniform([-0.1, -0.1], [0.1, 0.0]), random.uniform(0.05, 0.45)
+        e, mu, rolling = random.uniform(0.0, [0.8, 0.6, 0.4])
+        inertia, spin = 10.0 ** random.uniform(-7.0, -4.0), random.uniform(-100.0, 100.0)
+        velocity = np.array([random.uniform(-1.0, 1.0), -1.0])
+        start = np.array([at, R]) - 0.05 * velocity
+        found = run(
+            {"at": start.tolist(), "velocity": velocity.tolist(), "omega": spin},
+            {"spin": True, "rolling_friction": rolling}, {"until": 0.0505}, gravity=0.0,
+            hinge=pivot.tolist(), inertia=inertia, restitution=e, friction=mu,
+        )  # fmt: skip
+        own, lever = 0.5 * M * R**2, np.array([at - pivot[0], pivot[1], 1.0])
+        roll, u = np.array([0.0, R, 1.0]), np.array([-1.0, velocity[0] + R * spin, spin])
+        by = np.diag([1.0 / M, 1.0 / M, 0.0]) + np.outer(roll, roll) / own
+        by += np.outer(lever, lever) / inertia
+        j, less = blow_on_lever(u, by, mu, rolling * R, e)
+        reduced += less
+        (blow,) = found.select("impact")
+        assert blow["velocity_after"] == pytest.approx(velocity + j[[1, 0]] / M, abs=1e-11)
+        assert blow["omega_after"] == pytest.approx(spin + roll @ j / own, abs=1e-9)
+        assert found.swings["rate"][-1] == pytest.approx(-lever @ j / inertia, abs=1e-9)
+    assert 0 < reduced < 20
 
 
 @pytest.mark.parametrize("faces", [8, 16, 32])

@@ -1,5 +1,5 @@
 /* The impulses of an impact of two particles of which one has corners, or of one and a surface, at all places at which they
-   touch. */
+   touch; and those of a disk at a hinge. */
 
 #include "core.h"
 
@@ -12,6 +12,8 @@
 #define HELD 1e-13
 /* Share of an impact's energy that it may gain by rounding. */
 #define GAINS 1e-12
+/* Greatest number of rounds for friction and rolling friction of a disk at a hinge, where each changes the other. */
+#define COUPLED 100
 /* Greatest number of impulses. */
 #define MOST (3 * MOST_TOUCHES)
 
@@ -243,3 +245,42 @@ double solve_with_energy(Contact *list, int count, double *back, const double (*
     }
 }
 
+/* Friction (1) or rolling friction (2) that stops a slip or a relative rotation, as far as its bound allows, with the
+   normal impulse that changes the normal velocity by `wanted`. `free` is what there is to stop without both impulses, and
+   `both` how much each of them changes the other's velocity, 1/kg. */
+static double holds(const Contact *c, int n, double wanted, double free, double both) {
+    double gives = 1 / c->mass[n] - both * both * c->mass[0], bound = n == 1 ? c->friction : c->arm;
+    double low = 1 / (c->mass[0] * bound) - both, high = low + 2 * both;
+    if (!(gives > 0)) return 0;
+    low = low > 0 ? -MAX(wanted, 0) / low : -INFINITY;
+    high = high > 0 ? MAX(wanted, 0) / high : INFINITY;
+    return MIN(MAX(-(free + both * wanted * c->mass[0]) / gives, low), high);
+}
+
+/* Set the impulses with which a contact with a hinge changes its normal velocity by `wanted`. Each of them changes all
+   velocities there, so friction and rolling friction are solved together, with the normal impulse that belongs to them;
+   `u` are the velocities before. Together they must not create energy, as they might with Newton's restitution if the
+   impact itself reverses the slip (T. R. Kane and D. A. Levinson, Dynamics, 1985, sec. 5.7): then both are smaller, such
+   that they do no work. Of friction alone that brings the slip to the opposite of what it was. */
+void couple(const Contact *c, double wanted, const double *u, double *J) {
+    const Disk *d = W.disks + c->i;
+    double turn = 1 / W.movers[c->hung - 1].inertia, by[3], work = 0, change = 0;
+    double across = d->radius * d->inv_inertia + c->lever[1] * c->lever[2] * turn;
+    for (int n = 1; n < 3; n++) by[n] = c->lever[0] * c->lever[n] * turn;
+    J[1] = J[2] = 0;
+    for (int round = 0; round < COUPLED; round++) {
+        double last[3] = {0, J[1], J[2]};
+        for (int n = 1; n < 3; n++)
+            J[n] = holds(c, n, wanted - by[3 - n] * J[3 - n], u[n] + across * J[3 - n], by[n]);
+        if (J[1] == last[1] && J[2] == last[2]) break;
+    }
+    double less = by[1] * J[1] + by[2] * J[2];
+    for (int n = 1; n < 3; n++) {
+        work += J[n] * (2 * u[n] + by[n] * wanted * c->mass[0]);
+        change += J[n] * (J[n] / c->mass[n] + across * J[3 - n] - by[n] * less * c->mass[0]);
+    }
+    double share = work + change > 0 ? MAX(-work, 0) / change : 1;
+    J[1] *= share;
+    J[2] *= share;
+    J[0] = MAX((wanted - share * less) * c->mass[0], 0);
+}

@@ -277,7 +277,6 @@ double swung_open(const Contact *c);
 void push_hinge(const Contact *c, const double *J);
 double hinge_share(const Contact *c);
 double coupled(const Contact *c);
-double couple(const Contact *c, double wanted, double slip, double *tangent);
 void strike_hinge(int mover, double t);
 void leave_struck(int mover);
 int hold_hinge(Contact *list, int count, double (*u)[3], double *back);
@@ -356,6 +355,7 @@ void strike_corners(int i, int j, double t);
 void give_all(const Contact *c, const double *impulse);
 void find_matrix(Contact *list, int count, double size, int joined);
 double solve_with_energy(Contact *list, int count, double *back, const double (*u)[3]);
+void couple(const Contact *c, double wanted, const double *u, double *J);
 
 /* trigger.c */
 int is_triggered(int owner, int doing);

@@ -18,8 +18,6 @@
 #define LATE 1e-6
 /* Greatest number of sweeps over stops and motor of hinges that nothing touches. */
 #define ALONE 50
-/* Greatest number of rounds for normal impulse and friction of a contact in which each changes the other. */
-#define ROUNDS 8
 
 static Mover *hinge_of(const Contact *c) { return W.movers + c->hung - 1; }
 
@@ -414,26 +412,6 @@ double hinge_share(const Contact *c) { return moment_of(c, c->impulse) * c->turn
 
 /* Change of the slip per normal impulse, and of the normal velocity per tangential impulse, through the hinge, 1/kg. */
 double coupled(const Contact *c) { return c->lever[0] * c->lever[1] / hinge_of(c)->inertia; }
-
-/* The normal impulse that changes the normal velocity by `wanted`, and the friction with it, for a contact with a hinge,
-   where each impulse changes both velocities; `slip` is that before. Friction must not create energy, as it might with
-   Newton's restitution if the impact itself reverses the slip (T. R. Kane and D. A. Levinson, Dynamics, 1985, sec. 5.7):
-   so it does no more than bring the slip to the opposite of what it was. */
-double couple(const Contact *c, double wanted, double slip, double *tangent) {
-    double both = coupled(c), normal = wanted * c->mass[0];
-    *tangent = 0;
-    for (int n = 0; n < ROUNDS; n++) {
-        double most = c->friction * normal, free = slip + both * normal;
-        double holds = -free * c->mass[1], gives = -(2 * slip + both * normal) * c->mass[1];
-        holds = MIN(MAX(holds, -most), most);
-        if (both != 0) holds = MIN(MAX(holds, MIN(gives, 0)), MAX(gives, 0));
-        double last = *tangent;
-        *tangent = holds;
-        if (both == 0 || holds == last) break;
-        normal = MAX((wanted - both * *tangent) * c->mass[0], 0);
-    }
-    return normal;
-}
 
 /* Turn a hinge, given by the owner of its surfaces, with a torque until the next call. */
 EXPORT void turn_hinge(int owner, double torque) {

@@ -286,7 +286,6 @@ static void stop_turning(const Contact *c, double most, double arm, const double
     const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double slip = v[1] + c->drift, shared = (c->cornered ? c->own[1] : a->radius) * a->inv_inertia;
     if (c->two) shared -= (c->cornered ? c->others[1] : b->radius) * b->inv_inertia;
-    if (c->hung) shared += c->lever[1] / W.movers[c->hung - 1].inertia;
     double both = 1 - square(shared) * c->mass[1] * c->mass[2];
     double moment = both > 0 ? c->mass[2] * (shared * c->mass[1] * slip - v[2]) / both : 0;
     more[0] = 0;
@@ -303,15 +302,19 @@ static void give(Contact *c, double normal) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double *J = c->impulse, u[3], v[3], given[3], most = c->friction * normal;
     double arm = c->arm * normal, more[3] = {0, 0, 0};
-    int tied = is_tied(c->i) || is_tied(c->j);
+    /* A hinge that stands against its stop has no levers. */
+    int tied = is_tied(c->i) || is_tied(c->j), swings = c->hung && c->lever[2] != 0;
     relative(c, 0, u);
     J[0] = normal;
     J[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
-    if (tied) share_with_joints(c, normal / c->mass[0], u, J);
-    else if (c->hung) J[0] = couple(c, normal / c->mass[0], u[1] + c->drift, J + 1);
-    memcpy(more, J, 2 * sizeof(double));
-    if (tied) arm = 0;
     J[2] = 0;
+    if (tied) share_with_joints(c, normal / c->mass[0], u, J);
+    else if (swings) {
+        const double before[3] = {u[0], u[1] + c->drift, u[2]};
+        couple(c, normal / c->mass[0], before, J);
+    }
+    memcpy(more, J, sizeof more);
+    if (tied || swings) arm = 0;
     push(c, more);
     relative(c, 0, v);
     if (arm > 0) {
@@ -542,7 +545,7 @@ static void strike(int i, int j, double t) {
     if (jammed) jam(&c, t);
     else {
         c.impulse[2] = 0;
-        if (c.hung) c.impulse[0] = couple(&c, back - u[0], u[1], c.impulse + 1);
+        if (c.hung) couple(&c, back - u[0], u, c.impulse);
         hold_hinge(&c, 1, &u, &back);
         give(&c, c.mass[0] * (back - u[0]));
     }

@@ -517,6 +517,7 @@ typedef struct {
     double taken[2];     /* J; the most that restitution and friction losses of a crowd have been */
     double borne;        /* J; sum of weights times radii */
     double regained;     /* J; greatest fall of both together below these */
+    double risen;        /* J; the most that all have had at a step beyond what they brought and the ledger explains */
     double eager;        /* 1; less while a crowd gets back energy that it had lost, see `note_totals`: then slow approaches
                             may make less overlap, and overlaps are removed more slowly */
     double usual;        /* s; the step unless something cuts it short; what a step corrects is for this length */
@@ -905,6 +906,7 @@ typedef struct {
     double gained;          /* [in] J; by which solves broke their law of energy */
     double hastened;        /* [in] m/s2; greatest acceleration of a particle by a push by hand */
     double regained;        /* [in] J; greatest fall of the losses of all below their maxima before, both together */
+    double risen;           /* [in] J; the most that all have had at a step beyond what the ledger explains */
     double unsolved;        /* [in] radii; greatest overlap that the solve of a step left beyond what it asked for */
     double unit;            /* [in] J; unit of the entries of a crowd from a file, 0: they have all bits */
     double largest;         /* [in] m; radius of the largest particle, with its corners */

@@ -452,6 +452,8 @@ static void note_totals(void) {
         owed += W.taken[n] - all.entries[1 + n];
     }
     W.regained = MAX(W.regained, owed);
+    double explained = all.released + all.entries[0] - all.entries[1] - all.entries[2];
+    W.risen = MAX(W.risen, all.kinetic + all.potential - explained);
     W.eager = W.g > 0 && owed > OWED * W.borne ? WARY : 1;
     W.totals[W.total_count++] = all;
 }
@@ -772,7 +774,7 @@ static int begin_part(void) {
     W.border_count = -1;
     W.t = W.disks[W.low].release;
     W.smallest = W.low;
-    W.taken[0] = W.taken[1] = W.borne = W.regained = 0;
+    W.taken[0] = W.taken[1] = W.borne = W.regained = W.risen = 0;
     W.eager = 1;
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;

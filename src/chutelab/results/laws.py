@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from chutelab import core
 from chutelab.machine import Machine, hand_over
-from chutelab.results.record import EVENT, Record
+from chutelab.results.record import EVENT, Record, balance
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import number
 
@@ -319,7 +319,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
     laws.book_rows, laws.surface_count = len(books) // 3, len(recording.surfaces)
     laws.joined, laws.interact = len(machine.joints) > 0, interact
     laws.each, laws.pulley = rows.ndim > 1, machine.pulley is not None
-    laws.regained, laws.tilt = _regained(recording), machine.tilt
+    laws.regained, laws.risen, laws.tilt = _regained(recording), _risen(recording), machine.tilt
     laws.mover_count, laws.swing_count = len(machine.movers), len(recording.swings)
     laws.unsolved = recording.unsolved.max(initial=0.0) if len(recording.unsolved) else 0.0
     laws.largest, laws.loose = machine.particle.largest, machine.loose
@@ -346,6 +346,21 @@ def _regained(recording: Record) -> float:
     """Return the greatest fall of all losses below their maxima before, both together, J."""
     losses = recording.totals["entries"][:, 1:] if len(recording.totals) else np.zeros((1, 2))
     return float((np.maximum.accumulate(losses) - losses).sum(axis=1).max())
+
+
+def _risen(recording: Record) -> float:
+    """Return the most that all have had at a step beyond what the ledger explains, J."""
+    totals = recording.totals
+    if not len(totals):
+        return 0.0
+    (first, _), released = recording.ends(), np.flatnonzero(recording.released)
+    order = np.argsort(first["t"], kind="stable")
+    brought = np.sum(recording.energies(first, released), axis=0)[order].cumsum()
+    left = totals["kinetic"] + totals["potential"] - balance(totals["entries"])
+    # Of those released at a step it is not told whether they are in its sums.
+    sides = (np.searchsorted(first["t"][order], totals["t"], side) for side in ("left", "right"))
+    rises = [left - np.append(0.0, brought)[side] for side in sides]
+    return float(np.minimum(*rises).max(initial=0.0))
 
 
 _ENGINES = ("exact", "contact", "pymunk")

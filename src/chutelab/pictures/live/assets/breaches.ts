@@ -9,8 +9,8 @@ import type { Words } from "./words.ts";
 
 /** A whole run for the core's laws: all knots, and the first of each particle. */
 export type Run = { machine: Machine, knots: Float64Array, offsets: number[], books: number[],
-  swings: Map<number, Swings>, gained: number, regained: number, hastened: number,
-  unsolved: number,
+  swings: Map<number, Swings>, gained: number, regained: number, risen: number,
+  hastened: number, unsolved: number,
   contacts: number, steps: number, unreal: number };
 
 /** A broken law: the first particle, time (s), place (m) and surface; -1 for particle or surface if
@@ -20,8 +20,8 @@ export type Breach = { law: number, particle: number, surface: number, t: number
 
 /** The data that the laws need from a recording of a finished run. */
 function runOf(recording: Recording): Run {
-  const { machine, tracks, events, books, swings, gained, regained, hastened } = recording;
-  const { unsolved, contacts, steps } = recording;
+  const { machine, tracks, events, books, swings, gained, regained, risen } = recording;
+  const { hastened, unsolved, contacts, steps } = recording;
   const offsets = [0];
   for (const { count } of tracks) offsets.push(offsets[offsets.length - 1] + count);
   const knots = new Float64Array(offsets[tracks.length] * KNOT_ROW);
@@ -31,8 +31,8 @@ function runOf(recording: Recording): Run {
   const unreal = events.flatMap(({ t, x, y, before, after, normal, tangent }) =>
     [t, x, y, ...before, ...after, normal, tangent]).filter((value) => !isFinite(value)).length;
   return {
-    machine, knots, offsets, books: (books ?? []).flat(), swings, gained, regained, hastened,
-    unsolved, contacts, steps, unreal,
+    machine, knots, offsets, books: (books ?? []).flat(), swings, gained, regained, risen,
+    hastened, unsolved, contacts, steps, unreal,
   };
 }
 

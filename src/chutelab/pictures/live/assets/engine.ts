@@ -9,7 +9,8 @@ type Chunk = { type: "chunk", id: number, knots: Float64Array, tips: Float64Arra
   events: Event[], swings: number[], totals: Float64Array, triggered: number[], pushed: number,
   given: number, now: number,
   state: string, books: number[][] | null, reasons: number[] | null, gained: number,
-  regained: number, hastened: number, unsolved: number, contacts: number, steps: number,
+  regained: number, risen: number, hastened: number, unsolved: number, contacts: number,
+  steps: number,
   loads: { from: number, rows: Float64Array } };
 
 class Engine {

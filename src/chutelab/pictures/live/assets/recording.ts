@@ -250,6 +250,8 @@ class Recording {
   gained = 0;
   /** Greatest fall of all losses below their maxima before, both together, J. */
   regained = 0;
+  /** The most that all have had at a step beyond what the ledger explains, J. */
+  risen = 0;
   /** Greatest acceleration of a particle by a push, m/s². */
   hastened = 0;
   unsolved = 0;
@@ -279,18 +281,20 @@ class Recording {
   }
 
   add({
-    knots, tips, events, swings, now, state, books = null, gained = 0, regained = 0, hastened = 0,
-    unsolved = 0, contacts = 0, steps = 0, loads, triggered = [], pushed = 0, given = 0, totals,
+    knots, tips, events, swings, now, state, books = null, gained = 0, regained = 0, risen = 0,
+    hastened = 0, unsolved = 0, contacts = 0, steps = 0, loads, triggered = [], pushed = 0,
+    given = 0, totals,
   }: {
     knots: Float64Array, tips: Float64Array, events: Event[], swings: number[], now: number,
     state: string,
-    books?: number[][] | null, gained?: number, regained?: number, hastened?: number,
-    unsolved?: number, contacts?: number, steps?: number,
+    books?: number[][] | null, gained?: number, regained?: number, risen?: number,
+    hastened?: number, unsolved?: number, contacts?: number, steps?: number,
     loads?: { from: number, rows: Float64Array },
     triggered?: number[], pushed?: number, given?: number, totals?: Float64Array,
   }) {
     this.gained = gained;
     this.regained = regained;
+    this.risen = risen;
     this.hastened = hastened;
     this.unsolved = unsolved;
     this.contacts = contacts;

@@ -10,9 +10,10 @@
 //      "stalled" or "failed". `triggered` are the times of what waits for a touch, s; `totals` the
 //      sums over all particles at each step, for machines with joints; `pushed` the work of all
 //      pushes and `given` that of all surfaces, J; `gained` the energy by which solves have broken
-//      their law so far, J; `regained` the greatest fall of losses, J; `hastened` the
-//      greatest acceleration by a push, m/s²; `unsolved` the largest overlap that a solve left, in
-//      radii. `books` and `reasons` come at the end.
+//      their law so far, J; `regained` the greatest fall of losses, J; `risen` the most energy
+//      that the ledger could not explain at a step, J; `hastened` the greatest acceleration by a
+//      push, m/s²; `unsolved` the largest overlap that a solve left, in radii. `books` and
+//      `reasons` come at the end.
 //      {type: "laws", id, breaches}: the answer to "judge".
 //      {type: "broken"}: the core could not be loaded.
 
@@ -117,7 +118,7 @@ function tell(state: State) {
     triggered: core.triggered(), pushed: core.get("push_work"),
     given: core.books().slice(0, -1).reduce((sum, [work]) => sum + work, 0),
     books: over ? core.books() : null, reasons: over ? core.reasons() : null,
-    gained: core.get("gained"), regained: core.get("regained"),
+    gained: core.get("gained"), regained: core.get("regained"), risen: core.get("risen"),
     hastened: core.get("hastened"), unsolved: core.get("unsolved_most"),
     contacts: core.get("impact_count"), steps: core.get("step_count"), loads: core.takeLoads(over),
   }, { transfer: [knots.buffer, tips.buffer] });

@@ -205,10 +205,11 @@ LIMIT = 20.0
 
 @pytest.mark.parametrize(
     ("seed", "count"),
-    [(0, 60), *(pytest.param(n, 60, marks=pytest.mark.slow) for n in (1, 2)),
-     *(pytest.param(n, None, marks=pytest.mark.slow) for n in range(300))],
+    [(0, 60), *(pytest.param(n, 60, marks=pytest.mark.slow) for n in (1, 2)), (230, None),
+     *(pytest.param(n, None, marks=pytest.mark.slow) for n in range(300) if n != 230)],
 )  # fmt: skip
 def test_crowds_obey_the_laws(seed, count):
+    """In 230 a wedge opens: one step changes velocities by 13 m/s, which must bend no track."""
     _, machine = crowd(seed, count=count)
     begin = process_time()
 

@@ -7,6 +7,10 @@
    only where it has to, see `is_followed`: the states since the last knot wait until the cubic from that knot to the
    newest state no longer agrees with all of them. */
 
+/* Share of the radius by which the impulses of one step change the way of a step, from which on they count as a blow: far
+   beyond a hop, and what the removal of an overlap moves. */
+#define JOLT 0.05
+
 static Knot *waiting(int i) { return W.waits + WAITS * (long)(W.interact ? i : 0); }
 
 static void emit(const Knot *state) {
@@ -154,11 +158,12 @@ void flush_track(int i) {
 
    In contact a disk hops from step to step. Its smooth track goes through the states partway through the impulses of each
    step, halfway if steps are equal. There its velocity has no part of the hop, and its entries lack the work of the rest
-   of the impulses. */
+   of the impulses. If they change the velocity as a blow does (where a wedge opens, say), half of that would bend the
+   track of the step before, so the states before and after are noted, as of an impact. */
 void track_lasting(int i) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    double f = share_before(d);
+    double f = share_before(d), way = 0.5 * (W.length_before + W.length);
     double state[6] = {d->t, d->x, d->y, d->ux + f * (d->vx - d->ux), d->uy + f * (d->vy - d->uy),
                        d->uspin + f * (d->spin - d->uspin)};
     double entries[3];
@@ -170,9 +175,15 @@ void track_lasting(int i) {
         state[4] *= longer;
     }
     for (int n = 0; n < 3; n++) entries[n] = d->entries[n] + d->gain[n] - d->ahead[n];
-    if (!track->lasted) knot_before(i, d->t, d->ux, d->uy, d->uspin);
-    note(i, state, d->turned, entries);
-    track->lasted++;
+    int lasted = track->lasted, is_blow = W.interact && !d->halved
+        && square(d->vx - d->ux) + square(d->vy - d->uy) > square(JOLT * d->inner / way);
+    if (!lasted || is_blow) knot_before(i, d->t, d->ux, d->uy, d->uspin);
+    if (is_blow) {
+        double after[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin}, given[3];
+        for (int n = 0; n < 3; n++) given[n] = d->entries[n] + d->gain[n];
+        note(i, after, d->turned, given);
+    } else note(i, state, d->turned, entries);
+    track->lasted = is_blow ? MAX(lasted, 1) + 1 : lasted + 1;
     if (track->lasted == 1 || track->held[0] < d->t)
         memcpy(track->past, track->lasted > 1 ? track->held : state, sizeof track->past);
     memcpy(track->held, state, sizeof state);

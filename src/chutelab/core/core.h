@@ -257,8 +257,20 @@ void box_movers(double t, double h);
 int find_mover(const Surface *s);
 void prepare_mover(Surface *s);
 
-/* loop.c */
+/* riders.c */
+void ride_at(const Disk *d, double t, double *place);
 void spare(const Disk *d, const Surface *s, double t);
+double next_gate(double t);
+void plan_ride(Disk *d, double from);
+void ride_on(Disk *d, double t, double end);
+void write_ride(int i, double until);
+int ride_knots(const Disk *d);
+
+/* steps.c */
+void set_step(double h);
+double bent_step(double h);
+void rate_overlaps(void);
+double choose_step(void);
 
 /* hinge.c */
 void set_hinge(Mover *m, double t);

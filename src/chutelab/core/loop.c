@@ -1,4 +1,4 @@
-/* The run: releases, rides, steps, and the ends of tracks. */
+/* The run: releases, steps, and the ends of tracks. */
 
 #include <string.h>
 #include "core.h"
@@ -9,170 +9,17 @@ World W;
 #define SETTLED 0.1
 /* Greatest factor by which impulses are scaled up after two steps that were cut short, as their errors are scaled, too. */
 #define MOST_AGAIN 2.0
-/* rad between knots round the pulley: a cubic through them is off by rho angle^4 / 384, 9e-10 rho. */
-#define ARC_ANGLE 0.024
 /* Greatest number of tries to find the time at which an impact cuts a step with halved contacts. */
 #define CUTS 5
-/* A crowd of which more than the share MANY_DEEP of the contacts are deeper than DEEP radii as a step begins takes shorter
-   steps, down to LEAST_EASE of what hops allow: after each such step by SHORTEN, after others longer by LENGTHEN. Steps
-   that no scene asks for are at most CHOSEN of what hops allow, or the usual one: with longer ones walls bear more of what
-   fills a silo. The hops of corners that rotate have no such limit, as they are those of a few. */
-#define DEEP 4.5e-3
-#define MANY_DEEP 0.01
-#define LEAST_EASE 0.5
-#define CHOSEN 0.7
-#define SHORTEN 0.98
-#define LENGTHEN 1.01
 /* Losses of a crowd must not fall for long: then it lives on overlaps, as each fall makes one, and its removal lifts what
    falls next. If they are below their maxima by more than what lifts all particles by OWED radii, overlaps are
    made and removed by a share of WARY. */
 #define OWED 0.01
 #define WARY 0.25
-/* Least number of steps per period of a surface that shakes: with at most FEW_CONTACTS particles so many that it throws
-   what lies on it at its own speed to 1e-4, unless they are shorter than BRIEFEST, s; always so many that no impact is
-   missed. */
-#define FOLLOWED 200
-#define BRIEFEST 5e-6
-#define SEEN 8
 /* Greatest number of knots that an impact writes for a disk. */
 #define KNOTS_EACH 6
 
-/* ------------------------------------------------------------------------------------------ rides */
-
-/* Position and velocity of a rider: along the belt, then round the pulley, at constant speed. */
-static void ride_at(const Disk *d, double t, double *place) {
-    double along = d->ride_x + d->ride_speed * (t - d->ride_from), rho = d->ride_rho;
-    /* Angle from the top of the pulley, clockwise; where the belt meets the pulley it is -incline. */
-    double phi = MAX(along, 0) / rho - W.ride_incline;
-    double c = phi != 0 ? cos(phi) : 1, s = phi != 0 ? sin(phi) : 0;
-    place[0] = rho * s + MIN(along, 0) * c;
-    place[1] = rho * c - MIN(along, 0) * s;
-    place[2] = d->ride_speed * c;
-    place[3] = 0 - d->ride_speed * s;
-}
-
-/* Set whether a surface ignores a disk from t on: a gate closes on it, or it is on the side from which a one-sided
-   surface lets it pass; or it is clear of such a surface again. In a crowd, a disk in contact may overlap by SUNK without
-   being ignored. */
-void spare(const Disk *d, const Surface *s, double t) {
-    double place[4] = {d->x, d->y, 0, 0}, side = 0, deep = (W.interact ? SUNK : 1e-9) * d->radius;
-    int comes = s->opens == t, *spared = spared_by(s, d);
-    if (!comes && !s->one_sided && (s->opens > t || !*spared)) return;
-    if (d->mode == RIDING) ride_at(d, t, place);
-    double gap = chain_gap(s, d, place[0], place[1], t, &side);
-    *spared = side < 0 || (comes ? gap < -deep : *spared && gap < 0);
-}
-
-/* When the next surface appears or vanishes, or its motion changes, s. */
-static double next_gate(double t) {
-    double next = next_turn(t);
-    for (int k = 0; k < W.surface_count; k++) {
-        if (W.surfaces[k].opens > t) next = MIN(next, W.surfaces[k].opens);
-        if (W.surfaces[k].closes > t) next = MIN(next, W.surfaces[k].closes);
-    }
-    return next;
-}
-
-/* Gap at t between a rider and the nearest surface that exists, is not its own and does not let it pass, and which one
-   that is. `way` is how far the rider can go before it reaches any surface, including those that let it pass. */
-static double ride_gap(const Disk *d, double t, int *which, double *way) {
-    double place[4], nx, ny, least = INFINITY;
-    *way = INFINITY;
-    ride_at(d, t, place);
-    for (int k = 0; k < W.surface_count; k++) {
-        const Surface *s = surface_at(k, t);
-        if (s->owner == W.ride_owner || t < s->opens || t >= s->closes) continue;
-        if (is_spared(s, d) && !s->one_sided) continue;
-        double gap = gap_to(s, place[0], place[1], d->radius, &nx, &ny);
-        *way = MIN(*way, fabs(gap));
-        if (gap < least && !is_spared(s, d)) {
-            least = gap;
-            *which = k;
-        }
-    }
-    return least;
-}
-
-/* Set when a ride ends: where cos phi = v^2 / (g rho); at once where the belt meets the pulley, if that is more than cos
-   phi there; or where it meets another surface. Its gap changes by no more than the path, so the search advances by the
-   gap, and stops where a gate changes. */
-static void plan_ride(Disk *d, double from) {
-    double v = d->ride_speed, rho = d->ride_rho, c = W.g > 0 ? v * v / (W.g * rho) : 1, t = from;
-    double turn = c < cos(W.ride_incline) ? acos(c) + W.ride_incline : 0;
-    int which = -1;
-    double way;
-    d->ride_from = from;
-    d->ride_met = -1;
-    d->ride_to = INFINITY;
-    if (v <= 0) return;
-    d->ride_to = from + (MAX(-d->ride_x, 0) + rho * turn) / v;
-    for (double safe = from; t < d->ride_to;) {
-        for (int k = 0; k < W.surface_count; k++)
-            if (W.surfaces[k].gate >= 0) spare(d, W.surfaces + k, t);
-        double gap = ride_gap(d, t, &which, &way);
-        if (gap <= 0) {
-            /* Bisect to the last place that is free. */
-            for (double mid = 0.5 * (safe + t); mid > safe && mid < t; mid = 0.5 * (safe + t)) {
-                if (ride_gap(d, mid, &which, &way) <= 0) t = mid;
-                else safe = mid;
-            }
-            d->ride_to = safe;
-            d->ride_met = which;
-            return;
-        }
-        safe = t;
-        t = MIN(t + MAX(way, 1e-3 * d->radius) / (v + W.fastest), next_gate(t));
-    }
-}
-
-/* Set a rider on the parabola that has its position now and at the end of the step. */
-static void ride_on(Disk *d, double t, double end) {
-    double now[4], then[4], h;
-    end = MIN(end, d->ride_to);
-    ride_at(d, t, now);
-    ride_at(d, end, then);
-    h = end - t;
-    d->x = now[0];
-    d->y = now[1];
-    d->t = t;
-    d->vx = h > 0 ? (then[0] - now[0]) / h - 0.5 * W.gx * h : now[2];
-    d->vy = h > 0 ? (then[1] - now[1]) / h - 0.5 * W.gy * h : now[3];
-    d->spin = 0;
-}
-
-/* Write a knot of a ride at t. The speed is constant, so the belt does the work against gravity. */
-static void ride_knot(int i, double t) {
-    Disk *d = W.disks + i;
-    double place[4], *knot = W.tracks[i].knot, entries[3] = {0, 0, 0};
-    ride_at(d, t, place);
-    entries[0] = -d->mass * (W.gx * (place[0] - knot[1]) + W.gy * (place[1] - knot[2]));
-    if (entries[0] != 0) book(d->entries, 0, W.ride_owner, entries);
-    d->x = place[0];
-    d->y = place[1];
-    d->vx = place[2];
-    d->vy = place[3];
-    d->spin = 0;
-    d->t = t;
-    bear_ride(i);
-    knot_now(i);
-}
-
-static void write_ride(int i, double until) {
-    const Disk *d = W.disks + i;
-    double top = d->ride_from - d->ride_x / d->ride_speed;
-    if (d->ride_speed > 0 && until > top) {
-        int pieces = 1 + (int)((until - top) * d->ride_speed / d->ride_rho / ARC_ANGLE);
-        if (top > W.tracks[i].knot[0]) ride_knot(i, top);
-        for (int n = 1; n < pieces; n++) ride_knot(i, top + (until - top) * n / pieces);
-    }
-    if (until > W.tracks[i].knot[0]) ride_knot(i, until);
-}
-
-/* Greatest number of knots that the rest of a ride may take. */
-static int ride_knots(const Disk *d) {
-    double most = 1.6 + MAX(W.ride_incline, 0);
-    return d->mode <= RIDING && d->ride_rho > 0 ? 4 + (int)(most / ARC_ANGLE) : 0;
-}
+/* --------------------------------------------------------------------------------------- releases */
 
 static void take_off(int i) {
     Disk *d = W.disks + i;
@@ -358,62 +205,6 @@ static void look_ahead(int i) {
     }
 }
 
-/* Step of a disk by itself, s, at most `h`, in which it moves by no more than TURN of the room that an arc leaves it.
-   That holds if the arc supports it, or did, or if it is at the opening and touches both ends. If it lies on another
-   piece, a step may take it up to the arc. */
-static double hollow_step(const Disk *d, double h) {
-    double speed = sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * h, nx, ny;
-    if (speed * h <= TURN * W.room) return h;
-    for (int k = 0; k < W.surface_count; k++) {
-        const Surface *s = surface_at(k, d->t);
-        double room = s->radius - d->radius;
-        if (s->shape == SEGMENT || !(room > 0) || speed * h <= TURN * room) continue;
-        if (square(d->x - s->x) + square(d->y - s->y) >= square(s->radius)) continue;
-        double off = gap_to(s, d->x, d->y, d->radius, &nx, &ny) - TOUCH * d->radius;
-        if (off < 0 || d->supports) h = MIN(h, MAX(TURN * room, off) / speed);
-    }
-    return h;
-}
-
-/* Height of a ledge up to which a joint counts as smooth for a disk by itself in a step, m. To close the gap at a ledge
-   in one step gives the speed ledge / h. An impact at the edge of a ledge turns the path by sqrt(2 ledge / r), the angle
-   at which the disk meets the edge: where the speed ledge / h is larger than such an impact gives, the step is short
-   enough to resolve the impact. */
-static double ledge_in(const Disk *d, double h) {
-    double way = (sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * h) * h;
-    return MAX(2 * way * way / d->radius, TOUCHING * d->radius);
-}
-
-/* Longest step, s, in which shaking surfaces are followed. */
-static double shaken_step(void) {
-    double most = 1 / (SEEN * W.shakes);
-    return W.high - W.low > FEW_CONTACTS ? most : MIN(most, MAX(1 / (FOLLOWED * W.shakes), BRIEFEST));
-}
-
-static void set_step(double h) {
-    W.step = h;
-    W.soft = 2 * W.g * h;
-    W.skip = SKIP / h;
-}
-
-/* Longest step, s, for two limits: disks inside arcs in a crowd hop no higher than HOP; and a corner, whose gap changes
-   at an accelerated rate while its particle rotates, is not moved faster by that than by its weight (without gravity, by
-   its weight on Earth). `h` is the length of the present step. */
-static double bent_step(double h) {
-    double most = INFINITY, press = (W.g > 0 ? W.g : EARTH) + W.haste, u[3];
-    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
-        const Disk *d = W.disks + c->i;
-        if (c->turns > 0) most = MIN(most, hop_time(d, W.g + c->turns));
-        if (!c->cornered) continue;
-        relative(c, 1, u);
-        double bends = 2 * (c->gap + u[0] * h - c->free_gap) / (h * h) - c->turns;
-        /* The step is short enough for its weight already. */
-        if (W.g > 0 && bends <= press) continue;
-        most = MIN(most, MAX(hop_time(d, press) * press / MAX(bends, press), SHORTEST * W.usual));
-    }
-    return most;
-}
-
 /* Record the energy and the ledger entries of all disks at the beginning of a step, and set how overlaps are treated from
    then on. */
 static void note_totals(void) {
@@ -458,18 +249,6 @@ static void note_totals(void) {
     W.totals[W.total_count++] = all;
 }
 
-/* Set which share of the longest step the next one of a crowd takes, by the overlaps that the last one has left: of pairs
-   and of contacts with surfaces. */
-static void judge_overlaps(void) {
-    int deep[2] = {0, 0}, all[2] = {0, 0};
-    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
-        deep[c->j < 0] += c->gap < -DEEP * inner_of(c->i, c->j);
-        all[c->j < 0]++;
-    }
-    W.ease *= deep[0] > MANY_DEEP * all[0] || deep[1] > MANY_DEEP * all[1] ? SHORTEN : LENGTHEN;
-    W.ease = MIN(MAX(W.ease, LEAST_EASE), W.easiest);
-}
-
 /* Begin a step: paths of riders and sleepers, pairs that may meet, lasting contacts and their solve. If an array is too
    small, return a `Full` status before anything has changed; the step can then be begun again. */
 static int begin_step(void) {
@@ -477,22 +256,7 @@ static int begin_step(void) {
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
     if (W.total_count >= W.total_room) return FULL_TOTALS;
     if (W.hinges && W.swing_count + 4 * W.mover_count > W.swing_room) return FULL_SWINGS;
-    double next = set_gates(W.t), stride = 0, press = W.g + W.haste + hastened();
-    double h = hop_time(W.disks + W.smallest, press), whirled = h;
-    for (int i = W.low; i < W.high && W.outline_count; i++) {
-        const Disk *d = W.disks + i;
-        h = MIN(h, hop_time(d, press));
-        if (has_corners(d) && d->mode == FREE) whirled = MIN(whirled, hop_time(d, press + whirl_of(d)));
-    }
-    W.easiest = W.chosen > 0 ? MIN(MAX(CHOSEN, W.chosen / h), 1) : 1;
-    double share = MIN(W.ease, W.easiest);
-    h = MIN(MIN(share * h, share / W.easiest * whirled), W.dt);
-    if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
-    if (W.hinges) h = hinge_step(h);
-    if (W.shakes > 0) h = MIN(h, shaken_step());
-    W.usual = h;
-    set_step(h);
-    if (!W.interact) W.ledge = ledge_in(W.disks + W.low, h);
+    double next = set_gates(W.t), stride = 0, h = choose_step();
     /* Steps end where a surface appears or vanishes, and at the end of the run. To avoid a very short last one, two equal
        steps share what is left. At the very end a step is solved for lasting contacts, but not carried out. */
     double stop = W.t < W.end_time ? MIN(next, W.end_time) : W.t + h;
@@ -565,7 +329,7 @@ static int begin_step(void) {
         }
     } while (woke);
     W.length = h;
-    if (W.interact) judge_overlaps();
+    if (W.interact) rate_overlaps();
     for (int i = W.low; W.hastened > 0 && i < W.high; i++) kick(W.disks + i, 0.5 * h);
     if (W.hinges) begin_hinges(W.t, h);
     W.swings_too = W.step_jams = 0;

@@ -44,7 +44,7 @@ FAMILIES = {
 PUSHES = (1e-9, 1e-6)
 """m, m/s, rad and rad/s: the second finds what is decided within the first, such as which of two
 corners strikes first."""
-CALM, RESOLVED = 1e4, 0.01
+CALM, RESOLVED = 1e3, 0.01
 """Times that a push may grow, and effect of another step, m and m/s; where either is more, half of
 the run is compared."""
 ROUNDING = 1e-11

@@ -373,8 +373,12 @@ class Recorder:
             mass = np.broadcast_to(self.machine.particle.mass, count)[released][order]
             weight = np.concatenate([[0.0], mass.cumsum()]) * self.machine.gravity
             lifted = weight * self.machine.height(np.array(self.origin))
-            before = np.searchsorted(begun[order], self.totals["t"], side="left")
-            self.totals["potential"] += lifted[before]
+            # A row that repeats a time comes after the releases of that time.
+            again = np.append(False, np.diff(self.totals["t"]) == 0.0)
+            first, then = (
+                np.searchsorted(begun[order], self.totals["t"], s) for s in ("left", "right")
+            )
+            self.totals["potential"] += lifted[np.where(again, then, first)]
         if self.impulses.size:
             if any(self.origin):
                 (x, y), force = self.origin, self.impulses["force"]

@@ -129,6 +129,21 @@ def test_a_wall_ends_the_ride_on_a_belt_that_holds(low, high, align):
     assert hit["t"] == pytest.approx(left["t"], abs=1e-10 if align == "true" else 2e-3)
 
 
+def test_a_lone_run_far_away_is_that_of_here_moved_there():
+    def fall(x):
+        floor = {"name": "floor", "from": [x - 1.0, 0.0], "to": [x + 1.0, 0.0]}
+        return chutelab.simulate({
+            "particle": {"radius": 0.01, "mass": 0.1}, "surface": [floor],
+            "stream": {"at": [x, 0.5], "velocity": [0.5, 0.0]}, "run": {"until": 1.0},
+        }, engine="pymunk")  # fmt: skip
+
+    here, there = fall(0.0), fall(4096.0)
+    assert len(here.select("impact")) > 1
+    for name in ("knots", "events"):
+        moved = getattr(here, name)["position"] + [4096.0, 0.0]
+        assert getattr(there, name)["position"] == pytest.approx(moved, abs=1e-12)
+
+
 def test_the_bits_do_not_depend_on_where_shapes_lie_in_memory():
     # Chipmunk keeps contacts by the addresses of their shapes: other ones alive move the next.
     m, alive = machine("stream", "stream.count=5", "run.until=1.0"), []

@@ -357,13 +357,15 @@ class Recorder:
         elif lies_there and not self.lent:
             # It may lie in the core's memory, so copy it, as bytes.
             events = np.array(events.view(np.uint8)).view(EVENT)
+        if self._turned or any(self.origin):
+            # They may be the engine's own.
+            knots, events = knots.copy(), events.copy()
         if self._turned:
-            knots, frame = knots.copy(), self.machine.frame
+            frame = self.machine.frame
             for rows in (knots, events, *[self.impulses][: self.impulses.size]):
                 for name in WAYS.intersection(rows.dtype.names or ()):
                     rows[name] = rows[name] @ frame
         if any(self.origin):
-            knots = knots.copy()
             for rows in (knots, events):
                 rows["position"] += self.origin
         if any(self.origin) and len(self.totals):

@@ -228,13 +228,14 @@ void account(Contact *list, int count) {
         c->given[0] = given[0];
         share_out(c, u, v, W.before, c->later, given);
         c->given[1] = given[0];
-        if (c->turns == 0) continue;
+        if (c->turns == 0 || c->halved) continue;
         if (mass == 0) mass = mass_of(list, count);
         double more = lacks(c, mass, u, v);
         c->later[1] += more;
         W.disks[c->i].lacks += more;
     }
-    if (!W.interact) return;
+    /* Halves of an impulse are pooled together: what one seems to gain by the hop between them the other loses. */
+    if (!W.interact || list->halved) return;
     pool(list, count, 0);
     pool(list, count, 1);
 }

@@ -357,6 +357,7 @@ double opens_by(const Contact *c);
 double bends_by(const Contact *c);
 void lean_first(Contact *c, double h);
 double lean_again(Contact *c, double h);
+void straighten(Contact *c);
 double bent_gap(const Contact *c, double h);
 int lies_flat(int i, int k);
 void forget_places(void);

@@ -209,6 +209,13 @@ RARELY double lean_again(Contact *c, double h) {
     return lean(c, 0.5 * (u[0] + v[0]) + hops, 0.5 * (u[1] + v[1]) + c->other[1] - c->moved[1]);
 }
 
+/* Turn a halved contact back to the normal of its place: its second half has that of the end of the step, and both
+   together turn the velocity without work. */
+void straighten(Contact *c) {
+    if (c->leans != 0) turn_contact(c, -c->leans);
+    c->leans = c->steep = 0;
+}
+
 /* The place of a corner inside an arc after a time h, with the present velocities. */
 static Touch arc_place(const Contact *c, double h) {
     const Disk *d = W.disks + c->i;

@@ -318,11 +318,13 @@ void solve_contacts(int again) {
             stirred |= (a->supports && a->rest == 0) || (b->supports && b->rest == 0);
         }
         swings |= W.swings_too;
-        for (int n = from; n < to && !again; n++) halved &= W.contacts[n].clings == 0 && W.contacts[n].turns == 0;
+        for (const Contact *c = list; c < W.contacts + to && !again; c++)
+            halved &= c->clings == 0 && (c->cornered || c->turns == 0);
         halved &= tied && !rests && W.interact && !W.swings_too && to - from <= FEW_CONTACTS;
         for (int n = from; n < to && !again; n++) {
             Contact *c = W.contacts + n;
             c->halved = W.disks[c->i].halved = halved;
+            if (halved) straighten(c);
             if (c->j >= 0) W.disks[c->j].halved = halved;
         }
         /* A drive presses with any force, so no spring would stop it. There the spring gives way by no more than what removes

@@ -32,7 +32,7 @@ void agree_with_contacts(double h) {
             }
         if (worst <= (W.contact_count > FEW_CONTACTS ? AGREES * W.accurate : FINE_TURNS * LEFT_BY_TURNS * W.pace)) return;
         for (Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
-            /* Start from zero change with the impulses as they are. */
+            /* Start from zero change with the impulses as they are; the path without them has changed with the pull. */
             const double back[3] = {-c->impulse[0], -c->impulse[1], -c->impulse[2]};
             push(c, back);
             for (int side = 0; side < 2; side++) {
@@ -40,8 +40,10 @@ void agree_with_contacts(double h) {
                 if (!d || d->tie < 0) continue;
                 double more = (d->tug[0] - d->tugged[0]) * c->nx + (d->tug[1] - d->tugged[1]) * c->ny;
                 if (c->cornered) more += (side ? -c->others[0] : c->own[0]) * (d->tug[2] - d->tugged[2]);
-                c->need -= side ? -more : more;
-                c->most -= side ? -more : more;
+                if (side) more = -more;
+                c->need -= more;
+                c->most -= more;
+                c->free_gap += more * h;
             }
         }
         solve_contacts(1);
@@ -101,6 +103,7 @@ static void describe_again(Contact *c, const Contact *last) {
         *c = one;
     }
     c->island = last->island;
+    c->halved = 1;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = c->drift = 0;
 }
 

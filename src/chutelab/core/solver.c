@@ -75,9 +75,11 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 /* Solve the contacts of an island (`rounds` > 0), or of one disk (0).
 
    A round is `sweeps` sweeps, until changes are at most `accurate`, m/s. It is good enough as well if gaps miss what they ask
-   for by at most `enough`, m/s; contacts that need finer changes than a crowd's get all rounds for them. Small changes that
-   leave gaps open are swept on ten times as finely. After the last round it is good enough if the changes still shrink, but
-   with a drive only if gaps miss no more than GROSS times `enough`.
+   for by at most `enough`, m/s; contacts that need finer changes than a crowd's get more rounds for them, as long as changes
+   shrink: what both corners of a box ask for that friction holds in an arc differs by h^2 from what a rigid body can do, and
+   each sweep then turns their friction against each other. Small changes that leave gaps open are swept on ten times as
+   finely. After the last round it is good enough if the changes still shrink, but with a drive only if gaps miss no more than
+   GROSS times `enough`.
 
    Else, and where sweeps diverge, the rigid bodies may have no solution: they are driven into a wedge that locks itself. Then
    friction is lowered, from contacts that change most, until there is one. If a drive presses, it presses harder in each
@@ -91,7 +93,7 @@ static void ease_friction(Contact *list, int count, double least, double by) {
    by themselves. */
 int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                    double enough) {
-    double first = INFINITY;
+    double first = INFINITY, before = INFINITY;
     int driven = 0, pressing = 0, lessened = 0, cornered = 0, ended, light = W.interact, fine = accurate < W.accurate;
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
@@ -120,9 +122,10 @@ int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, 
             if (ended && (fine || (more < 2 && !gross))) break;
             if (ended) accurate *= 0.1;
             if (change < INFINITY) worst = pressing ? MAX(left_open(), change) : left_open();
-            if (worst <= enough && !(fine && more > 1)) break;
+            if (worst <= enough && !(fine && more > 1 && change < SHRINKS * before)) break;
             if (change < INFINITY && more > 1) {
                 if (more-- == rounds) first = change;
+                before = change;
                 continue;
             }
             if (more == 1 && change < CRAWLS * first && !gross) break;
@@ -131,6 +134,7 @@ int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, 
             stalled = driven && stall(list, count, FOLLOWS * worst, INFINITY);
         }
         more = rounds;
+        before = INFINITY;
         if (!stalled) {
             ease_friction(list, count, FOLLOWS * worst, left > 1 ? 0.25 : 0);
             left--;

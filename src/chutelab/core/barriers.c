@@ -11,6 +11,8 @@
 
 /* Halvings of an interval at most: a flight of 5 m is then checked every millimetre. */
 #define HALVINGS 12
+/* Most pieces that are looked through anew after each blow, as a track goes on to others there. */
+#define FEW 8
 /* Places of each interval at which the check for a particle that is clear of a gate is made. */
 #define GATED 64
 /* Longest distance from one check to the next, in radii, for a particle near a moving piece. */
@@ -311,8 +313,9 @@ PAIRED static int is_clear_of_arc(const Curve *c, const Barrier *b, double limit
     double outer = b->radius + limit, inner = b->radius - limit;
     Two q[4];
     square_distance(c, two_at(&b->x), q);
-    /* For a mass point the limit is below 0 at first, so both may hold. */
-    if (all_from(q, 4, outer * outer) || (inner > 0 && all_to(q, 4, inner * inner))) return 1;
+    /* The first coefficient tells which of both may hold. For a mass point the limit is below 0 at first, so both may. */
+    if (q[0][0] >= outer * outer && all_from(q, 4, outer * outer)) return 1;
+    if (inner > 0 && q[0][0] <= inner * inner && all_to(q, 4, inner * inner)) return 1;
     if (b->whole) return 0;
     /* Beyond the ends: not counterclockwise of the first end, or not clockwise of the last one; both for an arc of more
        than half a circle. */
@@ -542,18 +545,16 @@ PAIRED static void check_knot(const Curve *before, const Curve *after, const Bar
 /* An interval of a track: its path, and the box round it. */
 typedef struct { Curve path; Box box; int knot; } Interval;
 
-/* Check consecutive intervals, first by their common box. */
-PAIRED static void check_intervals(const Interval *some, int count, const Box *box, Barrier *pieces) {
-    int near = 0;
-    for (int k = 0; k < L.piece_count; k++) {
-        if (!pieces[k].mover && !pieces[k].one_sided && !apart(box, pieces[k].box, At.margin)) pieces[near++].near = k;
+/* Check consecutive intervals, first by their common box, and begin with none. */
+PAIRED static void check_intervals(const Interval *some, int *count, Box *box, Barrier *pieces) {
+    for (int k = 0; k < L.piece_count && *count; k++) {
+        Barrier *b = pieces + k;
+        if (b->mover || b->one_sided || apart(box, b->box, At.margin)) continue;
+        for (const Interval *now = some; now < some + *count; now++)
+            if (*count == 1 || !apart(&now->box, b->box, At.margin)) check_interval(&now->path, b, k, now->knot);
     }
-    for (int k = 0; k < near; k++) {
-        Barrier *b = pieces + pieces[k].near;
-        for (const Interval *now = some; now < some + count; now++) {
-            if (!apart(&now->box, b->box, At.margin)) check_interval(&now->path, b, pieces[k].near, now->knot);
-        }
-    }
+    *box = all_apart();
+    *count = 0;
 }
 
 /* Check an interval of a track beside a moving piece or a one-sided chain, in steps in which the particle cannot come too
@@ -635,7 +636,10 @@ PAIRED int find_hits(int i) {
     for (int k = 0; k < L.piece_count; k++) pieces[k].clear = NAN;
     for (int k = L.offsets[i]; k < L.offsets[i + 1] - 1 && !is_cornered(); k++) {
         const double *a = KNOT(k), *b = a + L.row;
-        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) continue;
+        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) {
+            if (L.piece_count <= FEW) check_intervals(some, &count, &box, pieces);
+            continue;
+        }
         Interval *now = some + count++;
         const Two *p = now->path.p;
         now->path = curve_after(a);
@@ -649,13 +653,9 @@ PAIRED int find_hits(int i) {
             last = now->path;
             first = 0;
         }
-        if (count == WIDTH) {
-            check_intervals(some, count, &box, pieces);
-            box = all_apart();
-            count = 0;
-        }
+        if (count == WIDTH) check_intervals(some, &count, &box, pieces);
     }
-    check_intervals(some, count, &box, pieces);
+    check_intervals(some, &count, &box, pieces);
     check_moving_pieces(i, pieces);
     return L.hit_count > before;
 }

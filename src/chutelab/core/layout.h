@@ -821,7 +821,6 @@ typedef struct {
     double clear;           /* s; time at which a particle got clear of a gate, see `forgiven`; NAN: not known */
     int surface;            /* [in] which surface it is part of */
     int whole;              /* whether it is a full circle */
-    int near;               /* of a list of pieces that may be met */
     int mover;              /* [in] number, from 1 on, of its mover; 0 if it does not move */
     int one_sided;          /* [in] as in `Surface` */
     int chain;              /* number of pieces of a chain of such, at its first piece */

@@ -85,6 +85,17 @@ typedef struct {
    there (before the end, within rounding). */
 typedef struct { int obstacle, side, meets; } Onward;
 
+/* The nearest angle in one direction where a ride ends, and what is there. */
+typedef struct {
+    double angle;           /* rad; infinite if the path is free */
+    int obstacle, side;
+    int handover;           /* the ride continues there without an impact */
+    int joint;              /* set of all that is touched at once there, or -1 */
+} Bound;
+
+/* A place where a ride round a circle may end, and how fast the gap falls there with the angle. */
+typedef struct { double closing; Bound what; } Stop;
+
 typedef struct {
     Obstacle *all;
     int count, faces;       /* faces come first, then ends, arcs from outside, arcs from inside, the pulley */
@@ -100,6 +111,9 @@ typedef struct {
     int change_count;
     Onward *onward;         /* (changes + 1, tips, 2) before the first change, and after each */
     Onward *opposite;       /* the same: what bounds, together with a face, the sector beside its end */
+    Stop *stops;            /* those of rides round one circle, on one side, in one epoch */
+    int stop_count, stops_on, stops_side, stops_epoch;
+    double stops_rho;       /* m; at this distance from its centre */
     double size;            /* m; the largest coordinate */
     double touch;           /* m; smaller gaps are rounding */
     double fitted;          /* m; radius that they fit, NAN at first */
@@ -110,14 +124,6 @@ extern Obstacles O;
 
 /* How a particle moves. From ON_FACE on it is in contact. */
 enum Way { OVER, FLIES, RIDES_BELT, ON_FACE, ON_ARC };
-
-/* The nearest angle in one direction where a ride ends, and what is there. */
-typedef struct {
-    double angle;           /* rad; infinite if the path is free */
-    int obstacle, side;
-    int handover;           /* the ride continues there without an impact */
-    int joint;              /* set of all that is touched at once there, or -1 */
-} Bound;
 
 /* A motion with constant acceleration until the next event. */
 typedef struct {

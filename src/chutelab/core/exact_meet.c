@@ -378,24 +378,14 @@ static int is_across(int circle, int k, int side, double x, double y, int epoch)
     return corner != NONE && !bounds(corner, k, side, epoch);
 }
 
-/* Update the bounds of a ride by an obstacle whose gap falls with phi at the rate `closing` at an angle. */
-static void narrow(Bound *found, double phi, double angle, double closing, Bound what) {
-    for (int way = 0; way < 2; way++) {
-        double sign = way ? 1.0 : -1.0;
-        double ahead = MAX(modulo(sign * (angle - phi) + NOW, TURN) - NOW, 0.0);
-        double place = phi + sign * ahead;
-        if (!(sign * closing > 0.0) || !(sign * (place - found[way].angle) < 0.0)) continue;
-        found[way] = what, found[way].angle = place;
-    }
-}
+/* Note a place where a ride may end, by an obstacle whose gap falls with phi at the rate `closing` there. */
+static void note_stop(double closing, Bound what) { O.stops[O.stop_count++] = (Stop){ closing, what }; }
 
-/* Find what stops a ride round a circle backwards and forwards, which is now at phi on the half `side`, among what exists
-   in an epoch. */
-void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
+/* List what may stop a ride round a circle on the half `side`, among what exists in an epoch. */
+static void list_stops(int circle, int side, int epoch) {
     const Obstacle *c = O.all + circle;
     double facing = sign_of(c->rho), rho = c->rho;
-    for (int way = 0; way < 2; way++)
-        found[way] = (Bound){ way ? INFINITY : -INFINITY, NONE, 0, 0, NONE };
+    O.stop_count = 0, O.stops_on = circle, O.stops_side = side, O.stops_epoch = epoch, O.stops_rho = rho;
     double reach = fabs(rho);
     Box box = { { c->x - reach, c->y - reach }, { c->x + reach, c->y + reach } };
     for (int n = 0; n < 2 && c->extent < TURN; n++) {
@@ -418,7 +408,7 @@ void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
                 double x = c->x + rho * up, y = c->y + rho * across;
                 double foot = (x - o->x) * o->tx + (y - o->y) * o->ty;
                 if (foot >= 0.0 && foot <= o->length && !is_across(circle, k, face, x, y, epoch))
-                    narrow(found, phi, angle, facing * sine(angle - tilt), (Bound){ 0.0, k, face, 0, NONE });
+                    note_stop(facing * sine(angle - tilt), (Bound){ angle, k, face, 0, NONE });
             }
         }
     for (int h = c->handovers; h != NONE; h = O.handovers[h].next) {
@@ -431,14 +421,14 @@ void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
         double closing = facing * sine(angle - tilt);
         int joint = tip->sets[over->face];
         Onward onward = O.onward[2 * (epoch * O.tip_count + over->tip) + over->face];
-        if (over->onto) narrow(found, phi, angle, closing, (Bound){ 0.0, number, face, 1, joint });
-        else narrow(found, phi, angle, -closing, (Bound){ 0.0, onward.obstacle, onward.side, !onward.meets, joint });
+        if (over->onto) note_stop(closing, (Bound){ angle, number, face, 1, joint });
+        else note_stop(-closing, (Bound){ angle, onward.obstacle, onward.side, !onward.meets, joint });
     }
     if ((c->crown[0] != 0.0 || c->crown[1] != 0.0) && c->speed != 0.0) {
         double tilt = angle_of(c->crown[0], c->crown[1]);
         for (int sign = -1; sign <= 1; sign += 2) {
             double angle = tilt + sign * 0.5 * PI;
-            narrow(found, phi, angle, side * sine(angle - tilt), (Bound){ 0.0, circle, -side, 1, NONE });
+            note_stop(side * sine(angle - tilt), (Bound){ angle, circle, -side, 1, NONE });
         }
     }
     for (int k = O.faces; k < O.count; k++) {
@@ -455,8 +445,24 @@ void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
             double away_x = rho * up - x, away_y = rho * across - y;
             if (!spans(o, away_x, away_y) || !is_reached(k, away_x, away_y, epoch)) continue;
             if (is_across(circle, k, 0, o->x + away_x, o->y + away_y, epoch)) continue;
-            narrow(found, phi, angle, -sign_of(o->rho) * facing * sine(angle - tilt),
-                   (Bound){ 0.0, k, 0, 0, NONE });
+            note_stop(-sign_of(o->rho) * facing * sine(angle - tilt), (Bound){ angle, k, 0, 0, NONE });
         }
     }
+}
+
+/* Find what stops a ride round a circle backwards and forwards, which is now at phi on the half `side`, among what exists
+   in an epoch. Particles of one radius have the same stops, so they are kept. */
+void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
+    if (circle != O.stops_on || side != O.stops_side || epoch != O.stops_epoch || O.all[circle].rho != O.stops_rho)
+        list_stops(circle, side, epoch);
+    for (int way = 0; way < 2; way++) found[way] = (Bound){ way ? INFINITY : -INFINITY, NONE, 0, 0, NONE };
+    for (const Stop *s = O.stops; s < O.stops + O.stop_count; s++)
+        for (int way = 0; way < 2; way++) {
+            double sign = way ? 1.0 : -1.0;
+            if (!(sign * s->closing > 0.0)) continue;
+            double ahead = MAX(modulo(sign * (s->what.angle - phi) + NOW, TURN) - NOW, 0.0);
+            double place = phi + sign * ahead;
+            if (!(sign * (place - found[way].angle) < 0.0)) continue;
+            found[way] = s->what, found[way].angle = place;
+        }
 }

@@ -724,7 +724,8 @@ static int find_joints(void) {
     find_crowns();
     find_sets();
     find_handovers();
-    return 1;
+    O.stops = reserve(4.0 * O.faces + O.handover_count + 2 + 2.0 * (O.count - O.faces), sizeof *O.stops);
+    return !arena_full;
 }
 
 /* Build the obstacles of a member of a family, or of a single machine; return 0 if there is no room for them. */
@@ -778,7 +779,7 @@ int lay_obstacles(int member) {
 void fit_obstacles(void) {
     double r = A.given->radius, touch = ULP * (TOUCH_ULPS * size_for(A.given) + E.far);
     if (r == O.fitted && touch == O.touch) return;
-    O.touch = touch, O.fitted = r;
+    O.touch = touch, O.fitted = r, O.stops_on = NONE;
     for (int k = 0; k < O.count; k++) {
         Obstacle *o = O.all + k;
         double reach = r + BOX_TOUCHES * touch, x = o->x, y = o->y;

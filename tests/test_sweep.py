@@ -233,6 +233,35 @@ def test_surfaces_may_join_in_some_variants_only():
     assert len(np.unique(found["landing.vy.mean"][[0, 3, 6]].round(6))) > 1
 
 
+def test_points_and_disks_by_several_run_at_once():
+    """Disks meet the end of a ledge, which a point beside it misses."""
+    ledge = """
+[[surface]]
+name = "ledge"
+from = [0.0, 0.0]
+to = [1.0, 0.0]
+[stream]
+at = [-0.004, 0.5]
+velocity = [0.0, 0.0]
+interact = false
+count = 4
+[run]
+until = 2.0
+"""
+    block = block_of(parse(ledge), ["particle.radius=0,0.01,0.02,0"])
+    ((which, _),) = runs(block)
+    assert len(which) == 4
+    found = swept_block(block)
+    assert_same(found, swept_block(block, apart=True))
+    assert found[TOUCHES].tolist() == ["nothing", "ledge", "ledge", "nothing"]
+
+
+def test_machines_that_differ_in_speeds_alone_keep_their_own():
+    values = ["incoming.speed=1.4,1.4,2.0", "surface.ramp.speed=0.0,0.3"]
+    block = block_of(parse(JOINED), values)
+    assert_same(swept_block(block), swept_block(block, apart=True))
+
+
 def test_one_that_the_exact_engine_cannot_follow_spoils_no_other(monkeypatch):
     # A spinning disk that a belt presses into a corner: pymunk follows it.
     corner = """

@@ -6,6 +6,7 @@
    ride is stopped before. */
 
 #include <stdlib.h>
+#include <string.h>
 #include "exact.h"
 
 /* Share of a curvature; two pieces that leave a place in the same direction lie on each other if their curvatures differ
@@ -728,16 +729,45 @@ static int find_joints(void) {
     return !arena_full;
 }
 
+/* Whether the machine of a member is that of another, but for speeds of straight pieces and the pulley, and materials. */
+static int is_like(int member, int other) {
+    const Segment *one = E.segments + member * E.segment_count, *two = E.segments + other * E.segment_count;
+    const Wheel *v = E.wheels + member, *w = E.wheels + other;
+    const Lone *p = E.lones + member * E.each, *q = E.lones + other * E.each;
+    if ((p->radius > 0.0) != (q->radius > 0.0) || size_for(p) != size_for(q)) return 0;
+    if (E.wheel_count && (v->radius != w->radius || v->incline != w->incline)) return 0;
+    for (int s = 0; s < E.segment_count; s++) {
+        Segment same = two[s];
+        same.speed = one[s].speed;
+        if (memcmp(&same, one + s, sizeof same)) return 0;
+    }
+    return !memcmp(E.arcs + member * E.arc_count, E.arcs + other * E.arc_count, E.arc_count * sizeof(Arc));
+}
+
+/* Set the speeds of straight pieces and the pulley, which are all that differs from the member before. */
+static void set_speeds(int member) {
+    for (int k = 0; k < O.first_arc; k++)
+        if (O.all[k].source < E.segment_count)
+            O.all[k].speed = E.segments[member * E.segment_count + O.all[k].source].speed;
+    if (E.wheel_count) O.all[O.pulley].speed = E.wheels[member].speed;
+    O.stops_on = NONE;
+}
+
 /* Build the obstacles of a member of a family, or of a single machine; return 0 if there is no room for them. */
 int lay_obstacles(int member) {
     const Segment *segments = E.segments + member * E.segment_count;
     const Arc *arcs = E.arcs + member * E.arc_count;
+    const Lone *first = E.lones + member * E.each;
+    if (E.laid && is_like(member, E.laid - 1)) {
+        set_speeds(member);
+        return 1;
+    }
     arena = E.room, arena_end = E.room + E.room_size, arena_full = 0;
     parts = reserve(E.segment_count, sizeof *parts);
     bends = reserve(E.arc_count, sizeof *bends);
     bend_source = reserve(E.arc_count, sizeof *bend_source);
     if (arena_full) return 0;
-    points = !(E.lones[member].radius > 0.0);
+    points = !(first->radius > 0.0);
     O.fitted = NAN;
     part_count = E.segment_count, O.arcs = E.arc_count, O.bent = 0;
     for (int s = 0; s < part_count; s++) {
@@ -755,7 +785,7 @@ int lay_obstacles(int member) {
     double near;
     do {
         if (!list_tips()) return 0;
-        near = JOINT * size_for(E.lones + member);
+        near = JOINT * size_for(first);
     } while (cut_parts(near) || (points && cut_bends(near)));
     if (arena_full) return 0;
     int spots = O.tip_count;

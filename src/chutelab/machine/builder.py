@@ -474,7 +474,9 @@ def _particle(
         nominal = np.array([one.radius for one in scene.particles])[kind]
         mass, inertia = np.array(masses)[kind], np.array(inertias)[kind]
     radius = nominal if radius is None else radius
-    size = radius / nominal
+    # A mass point is as heavy as it is given.
+    sized = np.not_equal(nominal, 0.0)
+    size = np.divide(radius, nominal, out=np.ones(np.shape(radius)), where=sized)
     # Powers by libraries differ in the last bit.
     square = size * size
     cube = square * size

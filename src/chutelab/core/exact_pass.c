@@ -23,6 +23,9 @@
 #define EXPONENTS 10
 /* Share of |P + i Q| below which y is a difference of larger numbers, with their rounding. */
 #define SLOW 0.05
+/* Knots from one whose sine and cosine are computed to the next: those between are turned on from the one before, each of
+   which rounds once more. */
+#define FRESH 4
 /* Share of the longest h that the curve allows at the beginning: it may allow less later on. */
 #define FIRST 0.85
 
@@ -46,10 +49,9 @@ typedef struct { double phi, across, up, rest, y[4]; } Place;
 
 static double P, Q, wave, twice; /* wave: |P + i Q|, twice: 2 load */
 
-/* The state at an angle, by the exponential term there. */
-static Place place_at(double phi, double rest) {
-    Place p = { .phi = phi, .rest = rest };
-    sin_cos(phi, &p.up, &p.across);
+/* The state at an angle, by its sine and cosine and the exponential term there. */
+static Place place_at(double phi, double up, double across, double rest) {
+    Place p = { .phi = phi, .across = across, .up = up, .rest = rest };
     double even = P * p.across + Q * p.up, odd = Q * p.across - P * p.up, fade = twice * rest;
     p.y[0] = even + rest, p.y[1] = odd - fade;
     p.y[2] = twice * fade - even, p.y[3] = -odd - twice * (twice * fade);
@@ -90,7 +92,7 @@ int pass_round(const Circle *c, double longest, Ridden *end, Ridden *knots) {
     wave = length_of(P, Q);
     double up, across, sense = sign_of(c->w), way = sense * sign_of(rho), last = way > 0.0 ? c->high : c->low;
     sin_cos(c->phi, &up, &across);
-    Place now = place_at(c->phi, c->w * c->w - P * across - Q * up);
+    Place now = place_at(c->phi, up, across, c->w * c->w - P * across - Q * up);
     double whole = fabs(last - c->phi), most = 384.0 * curve(), from = now.rest;
     double h = FIRST * sqrt(sqrt(most * now.y[0] * now.y[0] / sqrt(bulge_at(&now))));
     h = MIN(MIN(h, WIDEST), WIDEST / fabs(twice));
@@ -107,10 +109,16 @@ int pass_round(const Circle *c, double longest, Ridden *end, Ridden *knots) {
         cosines[n] = series(COS, SINES, x2), sines[n] = way * x * series(SIN, SINES, x2);
         fades[n] = series(EXP, EXPONENTS, -way * twice * x);
     }
+    double turned_up, turned_across;
+    sin_cos(way * h, &turned_up, &turned_across);
     double t = 0.0, fallen = 0.0, fade = fades[0][0] * fades[0][1], width = h * fabs(rho);
     most *= most / square(square(square(h)));
     while (count < MOST_KNOTS && count < steps) {
-        Place then = place_at(count + 1.0 < steps ? c->phi + way * h * (count + 1.0) : last, now.rest * fade);
+        double phi = count + 1.0 < steps ? c->phi + way * h * (count + 1.0) : last;
+        double sine = now.up * turned_across + now.across * turned_up;
+        double cosine = now.across * turned_across - now.up * turned_up;
+        if (count % FRESH == 0 || phi == last) sin_cos(phi, &sine, &cosine);
+        Place then = place_at(phi, sine, cosine, now.rest * fade);
         double after = g * then.across - sign_of(rho) * bend * then.y[0];
         slope = MAX(slope, wave + fabs(twice * then.rest));
         double least = before + after - (g + slope * bend) * h;

@@ -272,6 +272,7 @@ def collect(module: Module, recorder: Recorder) -> None:
     # Particles from `lone` on were stopped.
     recorder.ended[: exact.lone] = lones["reason"][: exact.lone]
     books = module.array("books", REAL, recorder.by_surface.size, of="Exact")
-    recorder.by_surface = books.copy().reshape(recorder.by_surface.shape)
+    books = books if recorder.lent else books.copy()
+    recorder.by_surface = books.reshape(recorder.by_surface.shape)
     recorder.contacts = exact.contacts
     recorder.impulses = gather(module, len(recorder.machine.surfaces))

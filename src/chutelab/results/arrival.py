@@ -168,13 +168,19 @@ def never(count: int) -> NDArray[Any]:
     return event.repeat(count)
 
 
+def first_of(recording: Record, which: Ints) -> Ints:
+    """Return the number of the first of some events, by index, of each particle, (N,), or -1."""
+    index, particle = np.full(recording.count, -1), recording.labels[2][which]
+    # Of several assignments the last one stays.
+    index[particle[::-1]] = which[::-1]
+    return index
+
+
 def firsts(recording: Record, which: Ints) -> NDArray[Any]:
     """Return the first of some events, by index, of each particle, (N,); NaN without one."""
     if not len(which):
         return never(recording.count)
-    index, particle = np.full(recording.count, -1), recording.labels[2][which]
-    # Of several assignments the last one stays.
-    index[particle[::-1]] = which[::-1]
+    index = first_of(recording, which)
     found, without = recording.events.take(index), np.flatnonzero(index < 0)
     put(found, without, never(len(without)))
     return found

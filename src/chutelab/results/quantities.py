@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.results.arrival import arrivals, firsts, never
+from chutelab.results.arrival import arrivals, first_of, firsts, never
 from chutelab.results.ledger import ledger, ledger_of_each, ledger_of_variants, worked
 from chutelab.results.loads import load
 from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
@@ -33,7 +33,7 @@ from chutelab.scene.units import with_unit
 from chutelab.scene.variants import Family
 from chutelab.theory import Transfer, predict, unbounded
 from chutelab.theory.prediction import outside
-from chutelab.util.arrays import Bools, Floats, Numbers, begins, put, sorted_by
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers, begins, put, sorted_by
 from chutelab.util.tables import Sheet, Shown, number
 
 ALONG = 1e-14
@@ -51,6 +51,28 @@ def first(recording: Record, event: str, surface: str | None = None) -> NDArray[
     if surface not in recording.surfaces:
         return never(recording.count)
     return firsts(recording, recording.which(event, surface=surface))
+
+
+@kept
+def _first_of(recording: Record, event: str, surface: str) -> Ints:
+    """Return the numbers of the events of `first`, or of arrivals, (N,); -1 without one."""
+    if surface not in recording.surfaces:
+        return np.full(recording.count, -1)
+    kinds = () if event == "arrival" else (event,)
+    return first_of(recording, recording.which(*kinds, surface=surface))
+
+
+@kept
+def at_first(recording: Record, event: str, name: str, surface: str | None = None) -> Floats:
+    """Return a `column` of `first`, or of arrivals, (N,): rows of all columns are long."""
+    if event == "arrival" and recording.machine.interact:
+        return column(arrivals(recording), name)
+    index = _first_of(recording, event, surface or NEEDED.get(event, "outgoing"))
+    found = np.full(recording.count, nan)
+    if len(recording.events):
+        values = column(recording.events, name)[index]
+        found = np.where(index < 0, nan, values)
+    return found
 
 
 def column(events: NDArray[Any], name: str) -> Floats:
@@ -382,17 +404,15 @@ def each(recording: Record, name: str) -> Floats:
             return _at_end(recording, found[entry])
         case ["flight", "t"]:
             # From the incoming belt to the next surface.
-            left = column(first(recording, "separation"), "t")
-            met = (column(first(recording, event), "t") for event in ("impact", "landing"))
+            left = at_first(recording, "separation", "t")
+            met = (at_first(recording, event, "t") for event in ("impact", "landing"))
             return np.asarray(np.fmin(*met) - left)
         case ["impact", surface, key]:
-            return column(first(recording, "impact", surface), key)
+            return at_first(recording, "impact", key, surface)
         case ["sensor", sensor, key]:
             return first_passages(recording, sensor)[key]
-        case ["separation" | "impact" | "landing" as event, key]:
-            return column(first(recording, event), key)
-        case ["arrival", key]:
-            return column(arrivals(recording), key)
+        case ["separation" | "impact" | "landing" | "arrival" as event, key]:
+            return at_first(recording, event, key)
         case ["belt_work" | "slip_heat" | "power" as what]:
             # What the belt pays until a lone particle does not slip.
             work = np.full(recording.count, nan)

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.results import REASONS, Kind, Recording
-from chutelab.results.arrival import arrivals, fates
-from chutelab.results.quantities import measured
+from chutelab.results.arrival import fates
+from chutelab.results.quantities import at_first, measured
 from chutelab.results.stream import told_fates
 from chutelab.scene.quantities import COLUMNS, FORMER, HEAT, PAID, REGISTRY, lookup
 from chutelab.scene.variants import Quantity
@@ -146,7 +146,7 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
     if scene.outgoing is None:
         return found
     # What became of those that did not arrive, (V, M), and whose slip went on after that.
-    missed = np.isnan(arrivals(recording)["t"]).reshape(variants, -1)
+    missed = np.isnan(at_first(recording, "arrival", "t")).reshape(variants, -1)
     every, ended = missed.shape[1], recording.ended.reshape(missed.shape)
     restless = ~missed & (ended != REASONS.index("settled"))
     if recording.machine.until != "settled":
@@ -201,21 +201,24 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
     kept[1:] &= (particle[1:] != particle[:-1]) | (surface[1:] != surface[:-1])
     particle, surface = particle[kept], surface[kept]
     place = np.arange(len(particle)) - begins(particle, recording.count)
-    ways = np.full((recording.count, LONGEST + 1), -1)
+    # Short rows, one for each place, take a quarter of the memory.
+    ways = np.full((LONGEST + 1, recording.count), -1, dtype=surface.dtype)
     near = place <= LONGEST
-    ways[particle[near], place[near]] = surface[near]
+    ways[place[near], particle[near]] = surface[near]
     # A sequence as one number, as `np.unique` of rows takes ten times as long.
     taken, kinds, some = np.zeros(recording.count, dtype=np.int64), 1, len(recording.surfaces) + 1
-    for met in ways.T[: place.max(initial=-1) + 1]:
+    for met in ways[: place.max(initial=-1) + 1]:
         if kinds * some > np.iinfo(np.int64).max:
             found, taken = np.unique(taken, return_inverse=True)
             kinds = len(found)
-        taken, kinds = taken * some + met + 1, kinds * some
+        taken, kinds = taken * some, kinds * some
+        taken += met
+        taken += 1
     # Short numbers are sorted several times as fast.
     taken = taken.astype(np.min_scalar_type(kinds))
     _, example, taken = np.unique(taken, return_index=True, return_inverse=True)
     names = np.empty(len(example), dtype=object)
-    for n, way in enumerate(ways[example].tolist()):
+    for n, way in enumerate(ways[:, example].T.tolist()):
         surfaces = [recording.surfaces[k] for k in way if k >= 0]
         if len(surfaces) > LONGEST:
             surfaces[LONGEST - 1 :] = ["and so on"]

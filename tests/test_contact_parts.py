@@ -463,6 +463,27 @@ def test_a_gate_opens_and_shuts_again_to_the_instant(engine):
         assert y == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.parametrize("x", [-0.025, -0.01, 0.01])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("shape", [{"shape": "box", "size": [0.06, 0.06]}, {"radius": 0.03}])
+def test_where_a_gate_has_opened_all_is_as_if_it_had_never_been(shape, side, x):
+    """The end of a floor that an arc continued smoothly is a tip again; boxes fell through it."""
+    floor = {"name": "floor", "from": [0.0, 0.0], "to": [0.5, 0.0], "friction": 0.3}
+    gate = {"name": "gate", "center": [0.0, 0.2 * side], "radius": 0.2, "from_deg": 180.0,
+            "to_deg": 270.0, "opens_at": 0.005}  # fmt: skip
+    if side < 0.0:
+        gate |= {"from_deg": 90.0, "to_deg": 180.0}
+    tables = {"particle": {"mass": 0.1, "spin": True} | shape,
+              "stream": {"at": [x, 0.2], "velocity": [0.0, 0.0]},
+              "run": {"until": 0.4}}  # fmt: skip
+    with_gate, without = (
+        chutelab.simulate(tables | {"surface": surfaces}, engine="contact")
+        for surfaces in ([floor, gate], [floor])
+    )
+    assert not with_gate.laws
+    assert np.allclose(with_gate.ends()[1]["position"], without.ends()[1]["position"], atol=1e-9)
+
+
 def test_a_particle_waits_until_a_gate_in_its_place_opens():
     for count in (1, 2):
         floor = face("gate", (-9.0, 0.0), (9.0, 0.0))

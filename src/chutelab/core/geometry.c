@@ -24,7 +24,7 @@ static int beyond(const Surface *s, double dx, double dy) {
 /* Whether a segment that is tangent to a circle hides the circle from a disk at (x, y): the disk is beside the segment,
    and the centre of the circle is on the other side of it. */
 static int hides(const Surface *s, const Surface *circle, double x, double y) {
-    if (s->shape != SEGMENT || !s->there || beyond(s, x - s->x, y - s->y)) return 0;
+    if (s->shape != SEGMENT || beyond(s, x - s->x, y - s->y)) return 0;
     double off = (y - s->y) * s->tx - (x - s->x) * s->ty;
     return off * ((circle->y - s->y) * s->tx - (circle->x - s->x) * s->ty) < 0;
 }
@@ -42,7 +42,7 @@ const Surface *face_at(const Surface *s, double x, double y) {
     }
     int end = beyond(s, x - s->x, y - s->y), mate = end ? mate_of(s, end > 0) : -1;
     const Surface *next = surface_at(MAX(mate, 0), s->posed);
-    return mate >= 0 && next->there && !beyond(next, x - next->x, y - next->y) ? next : s;
+    return mate >= 0 && !beyond(next, x - next->x, y - next->y) ? next : s;
 }
 
 /* Distance of a point from the nearer end of a piece, m, and the unit vector from that end to the point. */

@@ -422,3 +422,32 @@ def test_a_surface_that_waits_to_be_touched_for_is_not_in_the_way_at_the_release
     assert is_refused({"surface": [gate, floor], "stream": stream})
     waits = {"closes_when": {"touched": "floor"}}
     assert not is_refused({"surface": [gate | waits, floor], "stream": stream})
+
+
+@pytest.mark.parametrize("shapes", [("box", "disk"), ("disk", "box"), ("box", "box")])
+@pytest.mark.parametrize("starts", [(0.0, 0.0), (0.0, 0.0105)])
+@pytest.mark.parametrize("beside", [False, True])
+def test_what_is_struck_right_after_its_release_gets_the_blow(shapes, starts, beside):
+    """Within a step, and before any other impact: J = (1 + e) v m / 2 at the time gap / v.
+
+    A surface somewhere else changes nothing.
+    """
+    gap, v, e, m = 1e-4, 1.0, 0.5, 0.3
+    size = {"box": {"size": [0.05, 0.05]}, "disk": {"radius": 0.025}}
+    both = {"interact": True, "friction": 0.0, "restitution": e}
+    rows = [
+        {"particle": shape, "at": [x, 0.0], "velocity": [-u, 0.0], "start": start, **both}
+        for shape, x, u, start in zip(shapes, (0.0, 0.05 + gap), (0.0, v), starts, strict=True)
+    ]
+    tables = {
+        "gravity": 0.0,
+        "particle": [{"name": s, "shape": s, "mass": m, "spin": True, **size[s]} for s in size],
+        "stream": rows,
+        "run": {"until": starts[1] + 3e-3, "dt": 1e-3},
+    }
+    if beside:
+        tables["surface"] = [{"name": "floor", "from": [-1.0, -1.0], "to": [1.0, -1.0]}]
+    found = simulate(tables, engine="contact")
+    blows = found.select(Kind.COLLISION)
+    assert np.unique(blows["t"]) == pytest.approx([starts[1] + gap / v], abs=1e-12)
+    assert blows["normal_impulse"].sum() == pytest.approx(0.5 * (1.0 + e) * m * v, rel=1e-12)

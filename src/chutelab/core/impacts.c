@@ -218,7 +218,7 @@ void foresee(int i) {
         for (int link = W.later_count < 0 ? -1 : d->nears; link >= 0; link = W.near_links[link]) {
             int j = W.near[link ^ 1];
             /* Of two disks that this shock has moved, the one that is foreseen last checks the pair. */
-            if (!is_live(W.disks + j) || (is_cornered(i, j) && W.disks[j].moved == W.shocks)) continue;
+            if (!is_live(W.disks + j) || (is_cornered(i, j) && W.disks[j].moved)) continue;
             foresee_pair(i, j, &due, &partner);
         }
         int n = W.later_count < 0 ? reachable(i) : 0;
@@ -684,12 +684,11 @@ void lie_down(int i) {
         const Surface *s = surface_at(k, d->t);
         double nx, ny, v[3];
         if (has_corners(d)) {
-            /* It becomes a contact in the next step, which begins now. */
+            /* It becomes a contact in the next step. */
             if (s->there == THERE && !is_spared(s, d) && lies_flat(i, k)) {
                 d->on = s->owner;
                 d->slips = 1;
             }
-            W.step_end = MIN(W.step_end, MAX(d->t, W.t));
             continue;
         }
         if (s->there != THERE || is_spared(s, d) || face_at(s, d->x, d->y) != s || is_held(d, k)) continue;
@@ -701,4 +700,6 @@ void lie_down(int i) {
         d->slips = 1;
         support(i, k, d->t);
     }
+    /* That step begins now. */
+    if (has_corners(d)) W.step_end = MIN(W.step_end, MAX(d->t, W.t));
 }

@@ -598,7 +598,9 @@ void tie_joints(void) {
     }
     if (fresh) stop();
     for (int k = 0; k < W.moved_count; k++) {
-        W.disks[W.moved[k]].changes++;
+        Disk *d = W.disks + W.moved[k];
+        d->changes++;
+        d->moved = 0;
         knot_after(W.moved[k]);
     }
     for (int i = W.low; i < W.high; i++)

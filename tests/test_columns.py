@@ -12,7 +12,7 @@ from chutelab.machine import build
 from chutelab.results import Kind, laws
 from chutelab.results.ledger import ledger
 from chutelab.scene import from_dict
-from columns import column
+from columns import G, column
 
 ROOT = Path(__file__).parents[1]
 
@@ -50,6 +50,19 @@ def test_what_jams_is_not_pressed_into_each_other(seed, count, until):
         deepest = max(deepest, np.nanmax(depth / np.minimum(radii[i], radii[j]), initial=0.0))
     assert deepest < 0.05
     assert laws.judge(found) == ()
+
+
+def test_belts_that_lock_a_column_do_not_press_it_together():
+    """At 10 g, by two slow belts: they stall, and pay for some weights, not for millions.
+
+    Per second F v, with v the belts' speed and F the sum of all frictions on them.
+    """
+    scene, g = column(82, 30), 10.0 * G
+    scene["gravity"] = g
+    found = run(build(from_dict(scene)))
+    assert laws.judge(found) == ()
+    weight, v = found.count * found.particle.mass * g, scene["surface"][0]["speed"]
+    assert found.by_surface[:, 0].sum() < 100.0 * weight * v * scene["run"]["until"]
 
 
 LONG = pytest.mark.skip(

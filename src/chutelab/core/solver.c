@@ -35,6 +35,9 @@
 #define FEWER 0.5
 /* Friction below this share of its bound holds. */
 #define HOLDS 0.999
+/* Where belts have pressed a contact deep, gaps may miss no more than this share of the slowest one's speed: else such a belt
+   would press it deeper, a little in each step. */
+#define YIELDS 0.1
 
 /* Whether a surface that moves drives a disk. */
 static int drives(const Contact *c) { return c->j < 0 && c->other[1] - c->moved[1] != 0; }
@@ -304,8 +307,8 @@ void solve_contacts(int again) {
     if (W.interact) sort_by_islands();
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
-        double least = INFINITY, heaviest = 0;
-        int driven = 0, pushed = 0, cornered = 0, tied = 0, stirred = 0, rests = 0, bent = 0, halved = 1;
+        double least = INFINITY, heaviest = 0, slowest = INFINITY;
+        int driven = 0, sunk = 0, pushed = 0, cornered = 0, tied = 0, stirred = 0, rests = 0, bent = 0, halved = 1;
         W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
@@ -313,6 +316,8 @@ void solve_contacts(int again) {
             least = MIN(least, MIN(a->radius, b->radius));
             heaviest = MAX(heaviest, MAX(a->mass, b->mass));
             driven |= presses(c);
+            if (drives(c)) slowest = MIN(slowest, fabs(c->other[1] - c->moved[1]));
+            sunk |= c->gap < -SUNK * inner_of(c->i, c->j);
             pushed |= c->moved[0] > 0;
             W.swings_too |= c->hung > 0;
             cornered |= c->cornered;
@@ -337,7 +342,7 @@ void solve_contacts(int again) {
             W.contacts[n].gives /= heaviest;
             if (!driven) W.contacts[n].parts = INFINITY;
         }
-        double accurate = W.accurate;
+        double accurate = W.accurate, enough = W.skip * least;
         int sweeps = W.sweeps;
         int few = to - from <= FEW_CONTACTS && (!rests || are_few(W.contact_count));
         if ((cornered || tied || W.swings_too) && few) accurate = FINE_FEW * W.pace;
@@ -348,9 +353,12 @@ void solve_contacts(int again) {
         /* Between a surface that pushes and sleepers, which do not give way, there may be no room: they wake. */
         for (Contact *c = list; c < list + to - from && pushed && rests; c++)
             if (sleeps(c->j)) W.disks[c->j].stirred = 1;
-        int rounds = pushed && rests ? 1 : MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS);
-        if (bent) solve_bent(list, to - from, rounds, sweeps, accurate, W.skip * least, FINE * least);
-        else if (W.interact) sweep_contacts(list, to - from, rounds, sweeps, PLAIN, accurate, W.skip * least);
+        /* Sweeps that go on do not part what a belt has pressed deep: it locks. */
+        int locks = sunk && slowest < INFINITY;
+        if (locks) enough = MIN(enough, YIELDS * slowest);
+        int rounds = locks || (pushed && rests) ? 1 : MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS);
+        if (bent) solve_bent(list, to - from, rounds, sweeps, accurate, enough, FINE * least);
+        else if (W.interact) sweep_contacts(list, to - from, rounds, sweeps, PLAIN, accurate, enough);
         else solve_alone(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);

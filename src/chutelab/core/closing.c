@@ -238,7 +238,7 @@ void close_step(double h) {
         d->supports = d->mode == ASLEEP;
         if (W.length_before > 0.01 * W.step) d->impacts = 0;
         for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
-        d->lacks = d->open = d->bends = 0;
+        d->lacks = d->open = d->bends = d->whirl = 0;
         if (d->mode == FREE) {
             d->calm += h;
             /* A particle with joints does not fall asleep. */
@@ -276,6 +276,12 @@ void close_step(double h) {
         double bends = !b && c->cornered ? bends_by(c) : 0;
         a->bends = MAX(a->bends, bends);
         relative(c, 1, u);
+        /* Without weight contacts do not hop, see touching.c. */
+        if (b && c->cornered && W.g > 0 && h > SHORTEST * W.step) {
+            double fast = closing_rate(c, u[0], h);
+            a->whirl = MAX(a->whirl, fast);
+            b->whirl = MAX(b->whirl, fast);
+        }
         relative(c, 0, v);
         if (!c->halved) book_lasting(c, past, h);
         a->supports++;
@@ -310,7 +316,7 @@ void close_step(double h) {
         Track *track = W.tracks + i;
         d->ends = -1;
         d->lies = d->supports > 0;
-        d->whirl = d->lies ? whirl_of(d) : 0;
+        d->whirl = d->lies ? MAX(d->whirl, whirl_of(d)) : 0;
         if (d->mode != FREE) continue;
         settle_down(d, h);
         if (!d->supports) {

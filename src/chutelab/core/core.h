@@ -179,6 +179,10 @@ static inline const Surface *surface_at(int k, double t) {
 static inline int is_hung(int k) { return W.surfaces[k].mover >= 0 && W.movers[W.surfaces[k].mover].inertia > 0; }
 /* Whether a surface moves in this step. */
 static inline int stirs(const Surface *s) { return s->mover >= 0 && W.movers[s->mover].stirs; }
+/* Acceleration, m/s2, at which a gap closes without impulses in a step of length h, at a speed of `opens` at first. */
+static inline double closing_rate(const Contact *c, double opens, double h) {
+    return 2 * (c->gap + opens * h - c->free_gap) / (h * h);
+}
 /* Normal impulse of a contact less that of cohesion, N s. */
 static inline double pressed(const Contact *c) { return c->impulse[0] - c->clings; }
 double swung(const Contact *c, double f);

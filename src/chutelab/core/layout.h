@@ -122,7 +122,7 @@ typedef struct {
     int smooth;             /* number, from 1 on, of the step in which its hop was ended */
     int lies;               /* whether a lasting contact presses it in this step */
     double whirl;           /* m/s2; if so, greatest centripetal acceleration of its corners at the beginning of the step,
-                               else 0 */
+                               and at which gaps to other particles close without impulses, else 0 */
     double inner, broad;    /* m; radius of the inner circle, and of a circle of its area; or its own */
     double tug[3], tugged[3]; /* m/s, m/s, rad/s; change by half of a step's pull of its joints, now and before */
     double drawn[3];        /* m/s2, m/s2, rad/s2; acceleration by its joints in the latest step that was not brief */

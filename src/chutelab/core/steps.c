@@ -67,7 +67,7 @@ double bent_step(double h) {
         if (c->turns > 0) most = MIN(most, hop_time(d, W.g + c->turns));
         if (!c->cornered) continue;
         relative(c, 1, u);
-        double bends = 2 * (c->gap + u[0] * h - c->free_gap) / (h * h) - c->turns;
+        double bends = closing_rate(c, u[0], h) - c->turns;
         /* The step is short enough for its weight already. */
         if (W.g > 0 && bends <= press) continue;
         most = MIN(most, MAX(hop_time(d, press) * press / MAX(bends, press), SHORTEST * W.usual));

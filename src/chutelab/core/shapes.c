@@ -264,9 +264,11 @@ static int is_inside(const Shape *a, const Surface *s, double px, double py) {
     return result;
 }
 
-/* How far beyond an end of a segment a corner may be and still be on the segment: only rounding, unless the segment
-   continues smoothly. */
-static double past_end(const Surface *s, int end, double near) { return mate_of(s, end) < 0 ? ROUNDED * near : near; }
+/* How far beyond an end of a segment a corner on one of its sides may be and still be on the segment: only rounding, unless
+   the segment continues smoothly, or another one continues to that side, where a corner beyond the end is through that. */
+static double past_end(const Surface *s, int end, int side, double near) {
+    return mate_of(s, end) < 0 && !(s->hollows[end] & (side > 0 ? 1 : 2)) ? ROUNDED * near : near;
+}
 
 /* Find what a candidate is on, and fill in its place; return 0 if it doesn't touch there. */
 int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
@@ -277,7 +279,7 @@ int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
             double along = (q[0] - b->s->x) * b->s->tx + (q[1] - b->s->y) * b->s->ty;
             t->on = side_of(a, b->s, t->which, near);
             fill_in(a, b, t);
-            return along >= -past_end(b->s, 0, near) && along <= b->s->length + past_end(b->s, 1, near);
+            return along >= -past_end(b->s, 0, t->on, near) && along <= b->s->length + past_end(b->s, 1, t->on, near);
         }
         if (b->s) {
             double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);
@@ -378,7 +380,7 @@ RARELY int list_touches(int i, int j, double t, double within, double later, Tou
     for (int n = 0; n < count; n++) {
         Touch then = list[n];
         /* Something round may move round a corner meanwhile. */
-        if (then.which - a.count == b.round) find_place(&a, &b, near, &then);
+        if (b.round >= 0 && then.which - a.count == b.round) find_place(&a, &b, near, &then);
         else fill_in(&a, &b, &then);
         list[n].later = then.gap;
     }

@@ -56,6 +56,9 @@ TOGETHER: Final = 24576
 EXACT: Final = 16
 """The same for variants that run one by one, a millisecond each."""
 
+ROOM: Final = 3 * 2**20
+"""Numbers that the arrays of a block together hold, and more: 24 MB."""
+
 STEPPED: Final = 1
 """The same for stepped variants, which may take seconds each."""
 
@@ -215,6 +218,9 @@ def seeds_of(block: Block) -> Iterator[Block]:
 
 def swept(block: Block, *, apart: bool = False) -> Columns:
     """Return the rows of a block, see `runs`; with several seeds means and their errors."""
+    # glibc gives freed memory back to the system beyond twice the largest array freed so far, and
+    # each block would have it mapped anew. An array that is not written to costs nothing.
+    np.empty(ROOM)
     if block.repeat > 1:
         return averaged([swept(seed, apart=apart) for seed in seeds_of(block)])
     every = empty(len(block.values))

@@ -36,7 +36,7 @@
 /* Greatest number of knots and events that a round writes. */
 #define ROUND_KNOTS 400
 #define ROUND_EVENTS 32
-/* Number of knots and events for which room is made at first in a family, of which a few particles run at a time. */
+/* Number of knots for which room is made at first in a family, of which a few particles run at a time. */
 #define BRIEFLY 2000
 
 Exact E;
@@ -935,7 +935,7 @@ EXPORT int lay_out_exact(void) {
     RESERVE(E.books, 3.0 * E.surface_count * (E.apart ? E.lone_count : 1));
     E.room_size = 100 * (E.segment_count + E.arc_count) + 200;
     E.knot_room = E.brief ? BRIEFLY : (int)many + 500;
-    E.event_room = E.brief ? BRIEFLY : (int)many + 100;
+    E.event_room = E.brief ? 10 * E.lone_count + ROUND_EVENTS : (int)many + 100;
     RESERVE(E.room, E.room_size);
     E.knots = set_apart(E.knot_room, sizeof *E.knots);
     E.events = set_apart(E.event_room, sizeof *E.events);
@@ -961,7 +961,7 @@ int follow_some(int end, int *rounds) {
                 if (!STRETCH(E.knots, E.knot_count, E.knot_room)) return NO_MEMORY;
             }
             if (E.event_room - E.event_count < ROUND_EVENTS) {
-                if (E.event_room > KEPT) return FILLED;
+                if (E.event_room > (E.brief ? BRIEF_KEPT : KEPT)) return FILLED;
                 if (!STRETCH(E.events, E.event_count, E.event_room)) return NO_MEMORY;
             }
             if (!(*rounds)--) return PAUSING;

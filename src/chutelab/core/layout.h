@@ -687,6 +687,7 @@ typedef struct {
     double *books;          /* (1 or lone_count, surface_count, 3) entries of each surface, J */
     Knot *knots;            /* [out] */
     Event *events;          /* [out] */
+    int *labels;            /* [out] (event_count, 3) particle, kind and surface of each, if `brief` */
     double *room;           /* (room_size) for the obstacles that surfaces are */
     int segment_count, arc_count, wheel_count, lone_count, surface_count, kind_count; /* [in] */
     int knot_room, event_room, room_size;

@@ -17,6 +17,8 @@ void *stretch(const void *rows, int count, int had, unsigned size);
 /* Greatest number of knots, or of events, of a run of particles that do not meet for which room is made before the host
    has to take them. */
 #define KEPT 160000
+/* The same where most knots are dropped as a family runs. */
+#define BRIEF_KEPT (4 * KEPT)
 
 /* Whether all that was asked for could be reserved. */
 int has_room(void);

@@ -40,8 +40,9 @@ static char *put(char *to, const void *from, int size) {
     return to + size;
 }
 
-/* Convert events to rows of `results.EVENT`, which have no padding, and may take their place. Return where these end. */
-static char *put_events(char *to, const Event *events, int count) {
+/* Convert events to rows of `results.EVENT`, which have no padding, in place; return the number of bytes. */
+EXPORT int pack_events(Event *events, int count) {
+    char *to = (char *)events;
     for (int n = 0; n < count; n++) {
         const Event e = events[n];
         const signed char kind = e.kind;
@@ -57,13 +58,7 @@ static char *put_events(char *to, const Event *events, int count) {
         to = put(to, e.after + 2, 8);
         to = put(to, &e.normal, 16);
     }
-    return to;
-}
-
-/* The same in place; return the number of bytes. */
-EXPORT int pack_events(Event *events, int count) {
-    char *begin = (char *)events;
-    return (int)(put_events(begin, events, count) - begin);
+    return (int)(to - (char *)events);
 }
 
 static void end_events(Event *events, int count) { room()->packed = pack_events(events, count); }
@@ -130,14 +125,14 @@ static int judge_exact(const Exact *e) {
     return end_up();
 }
 
-/* What is kept of a family that is judged as it runs: rows of `results.KNOT` and `results.EVENT`. */
-static struct { char *knots, *events; int knot_count, event_count, knot_room, event_room; } Kept;
+/* What is kept of a family that is judged as it runs: rows of `results.KNOT`, and labels of events. */
+static struct { char *knots, *labels; int knot_count, label_count, knot_room, label_room; } Kept;
 
 /* Number of particles of a family that are followed, then judged. */
 #define SOME 8
-/* Number of bytes of a row of `results.KNOT`, which is the beginning of a `Knot`, and of one of `results.EVENT`. */
+/* Number of bytes of a row of `results.KNOT`, which is the beginning of a `Knot`, and of labels. */
 #define KNOT_SIZE ((int)offsetof(Knot, disk))
-#define EVENT_SIZE 99
+#define LABEL_SIZE ((int)(3 * sizeof(int)))
 
 /* Double the room of rows until there is some for `more` of them; return whether there is. */
 static int make_room(char **rows, int *room, int count, int more, int size) {
@@ -151,9 +146,9 @@ static int make_room(char **rows, int *room, int count, int more, int size) {
 }
 
 static int begin_briefly(const Exact *e) {
-    int knots = 4 * e->lone_count, events = 10 * e->lone_count;
-    Kept.knot_count = Kept.event_count = 0, Kept.knot_room = knots, Kept.event_room = events;
-    Kept.knots = set_apart(knots, KNOT_SIZE), Kept.events = set_apart(events, EVENT_SIZE);
+    int knots = 4 * e->lone_count, labels = 10 * e->lone_count;
+    Kept.knot_count = Kept.label_count = 0, Kept.knot_room = knots, Kept.label_room = labels;
+    Kept.knots = set_apart(knots, KNOT_SIZE), Kept.labels = set_apart(labels, LABEL_SIZE);
     return take_machine(e) && RESERVE(L.offsets, L.particle_count + 1) && has_room();
 }
 
@@ -181,17 +176,24 @@ static void keep_knots(const Exact *e, int first) {
     L.offsets[L.judged] = Kept.knot_count;
 }
 
+/* Keep the labels of new events, which are read more often than the events. */
+static void keep_labels(const Exact *e) {
+    int *to = (int *)Kept.labels + 3 * Kept.label_count;
+    for (const Event *now = e->events + Kept.label_count; now < e->events + e->event_count; now++)
+        *to++ = now->disk, *to++ = now->kind, *to++ = now->surface;
+    Kept.label_count = e->event_count;
+}
+
 /* Judge the particles that have ended, and keep what is needed of them; return whether nothing stands out. */
 static int judge_and_keep(Exact *e) {
     int first = L.judged;
     take_knots(e->knots, e->knot_count);
-    take_events(e->events, e->event_count);
+    take_events(e->events + Kept.label_count, e->event_count - Kept.label_count);
     L.offsets[first] = 0;
     if (!judge_some(e->lone)) return 0;
     keep_knots(e, first);
-    put_events(Kept.events + (long)Kept.event_count * EVENT_SIZE, e->events, e->event_count);
-    Kept.event_count += e->event_count;
-    e->knot_count = e->event_count = 0;
+    keep_labels(e);
+    e->knot_count = 0;
     return 1;
 }
 
@@ -202,13 +204,12 @@ static int follow_briefly(Exact *e, int *rounds) {
     while (L.judged < e->lone_count) {
         int course = follow_some(MIN(L.judged + SOME, e->lone_count), rounds);
         if (course != FINISHED && course != FILLED) return course;
-        int knots = Kept.knot_count + e->knot_count, events = Kept.event_count + e->event_count;
-        if (course == FILLED || MAX(knots, events) > 4 * KEPT) {
+        if (course == FILLED || Kept.knot_count + e->knot_count > BRIEF_KEPT) {
             begin_again(e);
             return FINISHED;
         }
         if (!make_room(&Kept.knots, &Kept.knot_room, Kept.knot_count, e->knot_count, KNOT_SIZE)
-            || !make_room(&Kept.events, &Kept.event_room, Kept.event_count, e->event_count, EVENT_SIZE))
+            || !make_room(&Kept.labels, &Kept.label_room, Kept.label_count, e->event_count - Kept.label_count, LABEL_SIZE))
             return NO_MEMORY;
         if (!judge_and_keep(e)) {
             begin_again(e);
@@ -221,8 +222,7 @@ static int follow_briefly(Exact *e, int *rounds) {
         begin_again(e);
         return FINISHED;
     }
-    e->knots = (Knot *)Kept.knots, e->knot_count = Kept.knot_count;
-    e->events = (Event *)Kept.events, e->event_count = Kept.event_count, room()->packed = Kept.event_count * EVENT_SIZE;
+    e->knots = (Knot *)Kept.knots, e->knot_count = Kept.knot_count, e->labels = (int *)Kept.labels;
     return FINISHED;
 }
 

@@ -30,7 +30,7 @@ from chutelab.core import (
 from chutelab.machine import Machine, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather
-from chutelab.results.record import KNOT, REASONS, Record
+from chutelab.results.record import EVENT, KNOT, REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError, read_knots
 from chutelab.util.arrays import Progress, unwatched
 
@@ -54,6 +54,26 @@ FIRST, MOST = 16, 100_000
 COURSE = constants("Course")
 
 UNTIL = {name.removeprefix("UNTIL_").lower(): one for name, one in constants("Until").items()}
+
+
+_PLACES = [
+    ("t", 0), ("disk", 0), ("other", 0), ("kind", 0), ("surface", 0), ("x", 0),
+    ("before", 0), ("after", 0), ("before", 16), ("after", 16), ("normal", 0), ("tangent", 0),
+]  # fmt: skip
+
+
+def _events() -> np.dtype[Any]:
+    own, names = dtype("Event"), EVENT.names or ()
+    fields: Any = own.fields
+    offsets = [fields[field][1] + more for field, more in _PLACES]
+    formats = [EVENT[name] for name in names]
+    return np.dtype(
+        {"names": names, "formats": formats, "offsets": offsets, "itemsize": own.itemsize}
+    )
+
+
+EVENTS = _events()
+"""`EVENT` as it lies in the core's own rows."""
 
 
 class CornerError(RuntimeError):
@@ -246,6 +266,10 @@ def ended(module: Module, recorder: Recorder, stalled: StalledError | None) -> R
     rounds: int = module.structs["Exact"].rounds
     record = recorder.finish(engine="exact", steps=rounds)
     take(module, record)
+    exact: Any = module.structs["Exact"]
+    if recorder.lent and exact.brief:
+        labels = module.array("labels", INTEGER, 3 * len(record.events), of="Exact").reshape(-1, 3)
+        vars(record)["labels"] = labels[:, 1], labels[:, 2], labels[:, 0]
     return recorder.whole(record, stalled)
 
 
@@ -260,7 +284,10 @@ def drain(module: Module, recorder: Recorder) -> None:
         rows = module.array("knots", dtype("Knot"), exact.knot_count, of="Exact")
         recorder.add(*read_knots(rows))
     exact.knot_count = 0
-    if exact.event_count:
+    if recorder.lent and exact.brief:
+        recorder.take_events(module.array("events", EVENTS, exact.event_count, of="Exact"))
+        exact.event_count = 0
+    elif exact.event_count:
         recorder.take_events(module.take_events("Exact"))
 
 

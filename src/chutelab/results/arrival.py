@@ -159,9 +159,9 @@ def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
     return [str(one) for one in said]
 
 
-def never(count: int) -> NDArray[Any]:
+def never(count: int, rows: np.dtype[Any] = EVENT) -> NDArray[Any]:
     """Return events (count,) that did not happen: all NaN."""
-    event = np.zeros(1, dtype=EVENT)
+    event = np.zeros(1, dtype=rows)
     for name in EVENT.names or ():
         if EVENT[name].base.kind == "f":
             event[name] = np.nan
@@ -182,7 +182,7 @@ def firsts(recording: Record, which: Ints) -> NDArray[Any]:
         return never(recording.count)
     index = first_of(recording, which)
     found, without = recording.events.take(index), np.flatnonzero(index < 0)
-    put(found, without, never(len(without)))
+    put(found, without, never(len(without), found.dtype))
     return found
 
 

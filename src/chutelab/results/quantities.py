@@ -353,7 +353,7 @@ def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
     place = np.arange(len(own)) - begins(own["particle"], len(holds))
     found = []
     for n in range(len(NEEDED)):
-        at, one = place == n, never(len(holds))
+        at, one = place == n, never(len(holds), own.dtype)
         put(one, own["particle"][at], own.take(at.nonzero()[0]))
         found.append(one)
     # An impact that throws a carried particle off the belt is not the theory's separation.

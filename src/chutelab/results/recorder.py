@@ -233,9 +233,9 @@ class Recorder:
         if self._angular:
             self._angles.append(np.broadcast_to(np.asarray(angle, dtype=float), len(knots)).copy())
 
-    def take_events(self, packed: NDArray[np.uint8]) -> None:
-        """Add events from the core, as bytes of rows of `EVENT`; the bytes are copied."""
-        self._events.append(np.frombuffer(packed, EVENT))
+    def take_events(self, rows: NDArray[Any]) -> None:
+        """Add events from the core: rows with the fields of `EVENT`, or bytes of its rows."""
+        self._events.append(np.frombuffer(rows, EVENT) if rows.dtype == np.uint8 else rows)
         self._taken = True
 
     def take_totals(self, rows: NDArray[Any]) -> None:

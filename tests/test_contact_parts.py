@@ -484,6 +484,48 @@ def test_where_a_gate_has_opened_all_is_as_if_it_had_never_been(shape, side, x):
     assert np.allclose(with_gate.ends()[1]["position"], without.ends()[1]["position"], atol=1e-9)
 
 
+def drawn_piece(rng, name, angle):
+    """A line or an arc that begins or ends at the origin and goes that way; some are belts."""
+    way, side = np.array([cos(angle), sin(angle)]), rng.choice([-1.0, 1.0])
+    piece = {"name": name, "friction": 0.5, "restitution": 0.5, "speed": rng.uniform(-2.0, 2.0)}
+    if rng.random() < 0.5:
+        ends = [[0.0, 0.0], (0.4 * way).tolist()][:: int(side)]
+        return piece | {"from": ends[0], "to": ends[1]}
+    radius, extent = rng.uniform(0.1, 0.3), side * rng.uniform(20.0, 150.0)
+    center = radius * side * np.array([-way[1], way[0]])
+    first = float(np.degrees(np.arctan2(*-center[::-1])))
+    first, last = sorted([first, first + extent])
+    return piece | {"center": center.tolist(), "radius": radius, "from_deg": first, "to_deg": last}
+
+
+@pytest.mark.parametrize("engine", ["exact", "contact"])
+def test_round_an_end_a_belt_runs_as_if_no_gate_had_been_there(engine):
+    """Which way the rim of an end runs depends on the pieces that meet there, while they are."""
+    met = 0
+    for seed in range(60):
+        rng = np.random.default_rng([3, seed])
+        belt, gate = (drawn_piece(rng, name, rng.uniform(0.0, 2.0 * pi)) for name in ("on", "off"))
+        angle, off = rng.uniform(0.0, 2.0 * pi), rng.uniform(-0.035, 0.035)
+        way = np.array([cos(angle), sin(angle)])
+        start = off * np.array([-way[1], way[0]]) - 0.2 * way
+        scenes = [
+            {"gravity": 0.0, "particle": {"radius": 0.03, "mass": 0.1, "spin": True},
+             "surface": surfaces, "run": {"until": 0.15},
+             "stream": {"at": start.tolist(), "velocity": (2.0 * way).tolist()}}
+            for surfaces in ([belt], [belt, gate | {"closes_at": 5.0}],
+                             [belt, gate | {"opens_at": 0.0005}])
+        ]  # fmt: skip
+        try:
+            runs = [chutelab.simulate(scene, engine=engine) for scene in scenes]
+        except SceneError:
+            # It would begin inside one of them.
+            continue
+        alone, *others = (one.ends()[1]["position"][0] for one in runs)
+        assert np.allclose(others, alone, atol=1e-9), seed
+        met += not np.allclose(alone, start + 0.3 * way)
+    assert met > 20
+
+
 def test_a_particle_waits_until_a_gate_in_its_place_opens():
     for count in (1, 2):
         floor = face("gate", (-9.0, 0.0), (9.0, 0.0))

@@ -501,5 +501,6 @@ void rouse(void);
 int stretch_swings(void);
 int make_room(int full);
 void join_surfaces(void);
+void find_crowns(void);
 
 #endif

@@ -148,7 +148,8 @@ static void normal_at(const Obstacle *o, int side, double *nx, double *ny) {
 /* The half of a circle that a normal points to: 1, or -1 away from the crown; inside an arc it is -1. Round the end of a
    segment with speed v the surface moves with v or -v along (n_y, -n_x), which on both its faces is v along the segment. */
 static int rim_side(const Obstacle *o, double nx, double ny) {
-    int half = nx * o->crown[0] + ny * o->crown[1] >= 0.0 ? 1 : -1;
+    const double none[2] = { 0.0, 0.0 }, *crown = o->met == END ? crown_of(o, epoch_now()) : none;
+    int half = nx * crown[0] + ny * crown[1] >= 0.0 ? 1 : -1;
     return o->rho < 0.0 ? -half : half;
 }
 

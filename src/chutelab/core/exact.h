@@ -43,7 +43,6 @@ typedef struct {
                                NAN if the particle doesn't fit in */
     double begin, extent;   /* rad; of an arc: first angle of contacts, and their range */
     double least[2], most[2]; /* x and y of unit vectors in that range */
-    double crown[2];        /* of an end: unit vector to the middle of the half that belongs to the left face of a piece */
     double speed;           /* m/s; along a face and its ends, clockwise round an arc */
     double turning;         /* rad/s; of arcs and their ends */
     double came, went;      /* s; it exists from the one to the other */
@@ -110,6 +109,7 @@ typedef struct {
     double *changes;        /* s; when gates appear or vanish, ascending */
     int change_count;
     Onward *onward;         /* (changes + 1, tips, 2) before the first change, and after each */
+    double *crowns;         /* (epochs, tips, 2) by the number of a place: see `find_crowns` */
     Onward *opposite;       /* the same: what bounds, together with a face, the sector beside its end */
     Stop *stops;            /* those of rides round one circle, on one side, in one epoch */
     int stop_count, stops_on, stops_side, stops_epoch;
@@ -174,6 +174,10 @@ int lay_obstacles(int member);
 void fit_obstacles(void);
 int is_there(int obstacle, int epoch);
 int epoch_at(double t);
+/* The crown of an end in an epoch. */
+static inline const double *crown_of(const Obstacle *end, int epoch) {
+    return O.crowns + 2 * (epoch * O.tip_count + O.tips[end->tips].spot);
+}
 int is_shared(int set, int obstacle, int face);
 int has_edge(int set, int obstacle, int edge);
 int is_beside(int circle, int obstacle, int face);

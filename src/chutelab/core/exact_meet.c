@@ -424,8 +424,9 @@ static void list_stops(int circle, int side, int epoch) {
         if (over->onto) note_stop(closing, (Bound){ angle, number, face, 1, joint });
         else note_stop(-closing, (Bound){ angle, onward.obstacle, onward.side, !onward.meets, joint });
     }
-    if ((c->crown[0] != 0.0 || c->crown[1] != 0.0) && c->speed != 0.0) {
-        double tilt = angle_of(c->crown[0], c->crown[1]);
+    if (c->met == END && c->speed != 0.0) {
+        const double *crown = crown_of(c, epoch);
+        double tilt = angle_of(crown[0], crown[1]);
         for (int sign = -1; sign <= 1; sign += 2) {
             double angle = tilt + sign * 0.5 * PI;
             note_stop(side * sine(angle - tilt), (Bound){ angle, circle, -side, 1, NONE });

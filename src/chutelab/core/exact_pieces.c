@@ -559,12 +559,12 @@ static int sort_by_bend(Ray *some, int count) {
     return kept;
 }
 
-/* Sort the rays of a place that exist in an epoch (all of them in epoch -1) into `flat`; return the number. `turns`
+/* Sort the rays of a place that exist in an epoch into `flat`; return the number. `turns`
    becomes 1 if all have the same angle. Of those that lie on each other only the first is kept. */
 static int sort_rays(int count, int epoch, int *turns) {
     int some = 0, kept = 0, last = 0;
     for (int n = 0; n < count; n++)
-        if (epoch < 0 || is_there(face_of(rays[n].piece, 1), epoch)) ring[some++] = rays[n];
+        if (is_there(face_of(rays[n].piece, 1), epoch)) ring[some++] = rays[n];
     qsort(ring, some, sizeof *ring, by_angle);
     for (int n = 1; n < some; n++)
         if (!(ring[n].angle - ring[last].angle <= COLLINEAR)) last = n;
@@ -624,14 +624,17 @@ static void find_onward(int epoch) {
     }
 }
 
-/* Set the crowns: unit vectors to the middle of that half of an end that belongs to the left face. At a free end it is
-   the piece's left normal. At a joint the rim between two pieces belongs to one face of both, however wide it is, and its
+/* Set the crowns of an epoch: unit vectors to the middle of that half of an end that belongs to the left face. At a free
+   end it is the piece's left normal. At a joint the rim between two pieces belongs to one face of both, however wide it is, and its
    middle bisects the angle between them: it has the direction of the sum of both normals and both ways out. */
-static void find_crowns(void) {
+static void find_crowns(int epoch) {
+    double *crowns = O.crowns + 2 * epoch * O.tip_count;
+    for (int n = 0; n < 2 * O.tip_count; n++) crowns[n] = 0.0;
     for (int n = 0; n < O.tip_count; n++) {
         if (at_spot[O.tips[n].spot] != n) continue;
-        int first = n, other = NONE, begins = 0, turns, count = sort_rays(list_rays(n), -1, &turns);
-        while (first != NONE && O.tips[first].circle == NONE) first = next_there[first];
+        int first = n, other = NONE, begins = 0, turns, count = sort_rays(list_rays(n), epoch, &turns);
+        while (first != NONE && (O.tips[first].circle == NONE || !is_there(face_of(first / 2, 1), epoch)))
+            first = next_there[first];
         if (first == NONE) continue;
         for (int k = 0; k < count; k++) {
             const Ray *one = flat + k, *two = flat + (k + 1) % count;
@@ -644,7 +647,7 @@ static void find_crowns(void) {
         double sign = next && other % 2 != first % 2 ? 1.0 : -1.0, way = begins == first % 2 ? -1.0 : 1.0;
         for (int k = 0; k < 2; k++) {
             double more = next ? sign * next->left[k] + way * (tip->out[k] + next->out[k]) : 0.0;
-            O.all[tip->circle].crown[k] = tip->left[k] + more;
+            crowns[2 * tip->spot + k] = tip->left[k] + more;
         }
     }
 }
@@ -716,13 +719,16 @@ static int find_joints(void) {
     int tips = O.tip_count, epochs = O.change_count + 1;
     O.onward = reserve(2.0 * tips * epochs, sizeof *O.onward);
     O.opposite = reserve(2.0 * tips * epochs, sizeof *O.opposite);
+    O.crowns = reserve(2.0 * tips * epochs, sizeof *O.crowns);
     O.members = reserve(16 * tips, sizeof *O.members);
     O.sets = reserve(6 * tips, sizeof *O.sets);
     O.handovers = reserve(6 * tips, sizeof *O.handovers);
     if (arena_full) return 0;
     O.set_count = O.member_count = O.handover_count = 0;
-    for (int epoch = 0; epoch < epochs; epoch++) find_onward(epoch);
-    find_crowns();
+    for (int epoch = 0; epoch < epochs; epoch++) {
+        find_onward(epoch);
+        find_crowns(epoch);
+    }
     find_sets();
     find_handovers();
     O.stops = reserve(4.0 * O.faces + O.handover_count + 2 + 2.0 * (O.count - O.faces), sizeof *O.stops);

@@ -160,7 +160,7 @@ static int has_settled(void) {
 static double set_gates(double t) {
     W.looked = t;
     if (!W.gate_count && !W.mover_count && W.step_count > 0) return INFINITY;
-    int stirred = stir(t) && W.step_count > 0;
+    int stirred = stir(t) && W.step_count > 0, changed = 0;
     for (int i = W.low; i < W.high && stirred; i++)
         if (W.disks[i].mode == ASLEEP) wake(i, W.t);
     for (int k = 0; k < W.surface_count; k++) {
@@ -169,6 +169,7 @@ static double set_gates(double t) {
         if (there != s->there && W.step_count > 0)
             for (int i = W.low; i < W.high; i++)
                 if (W.disks[i].mode == ASLEEP) wake(i, W.t);
+        changed |= (there == ABSENT) != (s->there == ABSENT);
         s->there = there;
         /* Pieces of a chain share a column of `spared`. */
         int is_first = s->gate >= 0 && (k == 0 || s->gate != s[-1].gate);
@@ -178,6 +179,7 @@ static double set_gates(double t) {
             spare(W.disks + i, s, t);
         }
     }
+    if (changed) find_crowns();
     return W.gate_count || W.mover_count ? next_gate(t) : INFINITY;
 }
 

@@ -210,7 +210,7 @@ static void find_crown(int k, int n, double r) {
         int end = W.ends[row] % 2;
         at_end(next, end, there, back);
         if (W.ends[row] == 2 * k + n || there[0] != place[0] || there[1] != place[1]) continue;
-        if (next->mover != s->mover) continue;
+        if (next->mover != s->mover || next->there == ABSENT) continue;
         double left = back[0] * s->ty - back[1] * s->tx;
         if (s->shape == SEGMENT && fabs(left) > ALIKE) s->hollows[n] |= left > 0 ? 1 : 2;
         double bends = curl_of(next, end) - curl_of(s, n);
@@ -336,10 +336,22 @@ static int lay_out_work(void) {
     return has_room();
 }
 
-/* Find which pieces continue where another one ends. A moving piece is only joined to pieces with the same motion. */
-void join_surfaces(void) {
+static double least_radius(void) {
     double least = INFINITY;
     for (int i = 0; i < W.disk_count; i++) least = MIN(least, W.disks[i].radius);
+    return least;
+}
+
+/* Set the crowns of pieces that do not move, by the pieces that exist: those of a moving one exist together. */
+void find_crowns(void) {
+    double least = least_radius();
+    for (int k = 0; k < 2 * W.surface_count; k++)
+        if (W.surfaces[k / 2].shape != CIRCLE && W.surfaces[k / 2].mover < 0) find_crown(k / 2, k % 2, least);
+}
+
+/* Find which pieces continue where another one ends. A moving piece is only joined to pieces with the same motion. */
+void join_surfaces(void) {
+    double least = least_radius();
     for (int k = 0; k < W.surface_count; k++) W.surfaces[k].mover = find_mover(W.surfaces + k);
     sort_ends();
     for (int k = 0; k < 2 * W.surface_count; k++)
@@ -452,6 +464,7 @@ EXPORT int prepare(void) {
     chain_pieces(TOUCHING * least);
     RESERVE(W.spared, (double)W.disk_count * W.gate_count);
     if (!has_room()) return 0;
+    for (int k = 0; k < W.surface_count; k++) W.surfaces[k].there = THERE;
     join_surfaces();
     for (int k = 0; k < W.surface_count; k++)
         if (W.surfaces[k].mover >= 0) prepare_mover(W.surfaces + k);

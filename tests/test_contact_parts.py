@@ -500,7 +500,7 @@ def drawn_piece(rng, name, angle):
 
 @pytest.mark.parametrize("engine", ["exact", "contact"])
 def test_round_an_end_a_belt_runs_as_if_no_gate_had_been_there(engine):
-    """Which way the rim of an end runs depends on the pieces that meet there, while they are."""
+    """Which way the rim of an end runs, and of what it is, the pieces say that are there."""
     met = 0
     for seed in range(60):
         rng = np.random.default_rng([3, seed])
@@ -513,7 +513,8 @@ def test_round_an_end_a_belt_runs_as_if_no_gate_had_been_there(engine):
              "surface": surfaces, "run": {"until": 0.15},
              "stream": {"at": start.tolist(), "velocity": (2.0 * way).tolist()}}
             for surfaces in ([belt], [belt, gate | {"closes_at": 5.0}],
-                             [belt, gate | {"opens_at": 0.0005}])
+                             [belt, gate | {"opens_at": 0.0005}],
+                             [gate | {"opens_at": 0.0005}, belt | {"closes_at": 0.0001}])
         ]  # fmt: skip
         try:
             runs = [chutelab.simulate(scene, engine=engine) for scene in scenes]

@@ -157,6 +157,7 @@ static int rim_side(const Obstacle *o, double nx, double ny) {
    place. */
 static Touch touch_of(int obstacle, int side) {
     const Obstacle *o = O.all + obstacle;
+    if (o->met == END && O.change_count && O.owned_in != epoch_now()) own_ends(epoch_now());
     int columns = E.segment_count + E.arc_count + (E.wheel_count > 0);
     const Pair *pair = E.materials + A.given->kind * columns + o->source;
     Touch c;

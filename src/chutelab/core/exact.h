@@ -108,6 +108,7 @@ typedef struct {
     int handover_count;
     double *changes;        /* s; when gates appear or vanish, ascending */
     int change_count;
+    int owned_in;           /* epoch for which ends have the belts and materials of their pieces: see `own_ends` */
     Onward *onward;         /* (changes + 1, tips, 2) before the first change, and after each */
     double *crowns;         /* (epochs, tips, 2) by the number of a place: see `find_crowns` */
     Onward *opposite;       /* the same: what bounds, together with a face, the sector beside its end */
@@ -174,6 +175,7 @@ int lay_obstacles(int member);
 void fit_obstacles(void);
 int is_there(int obstacle, int epoch);
 int epoch_at(double t);
+void own_ends(int epoch);
 /* The crown of an end in an epoch. */
 static inline const double *crown_of(const Obstacle *end, int epoch) {
     return O.crowns + 2 * (epoch * O.tip_count + O.tips[end->tips].spot);

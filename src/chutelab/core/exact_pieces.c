@@ -384,6 +384,7 @@ static int list_changes(void) {
     }
     qsort(O.changes, count, sizeof *O.changes, ascending);
     O.change_count = 0;
+    O.owned_in = NONE;
     for (int n = 0; n < count; n++)
         if (!n || O.changes[n] > O.changes[O.change_count - 1]) O.changes[O.change_count++] = O.changes[n];
     return 1;
@@ -856,6 +857,24 @@ int is_there(int obstacle, int epoch) {
     int there = is_open(o, NONE, since);
     for (int n = o->tips; n != NONE && !there; n = O.tips[n].next) there = is_open(o, n / 2, since);
     return there;
+}
+
+/* Give each end the belt and the material of a piece there that exists in an epoch: of the first one, but rather of one
+   that always exists. */
+void own_ends(int epoch) {
+    double since = epoch ? O.changes[epoch - 1] : -INFINITY;
+    for (int k = O.faces; k < O.count; k++) {
+        Obstacle *o = O.all + k;
+        int owner = NONE;
+        for (int n = o->tips; n != NONE && o->met == END; n = O.tips[n].next) {
+            int before = owner == NONE || (stays(n / 2) != stays(owner / 2) ? stays(n / 2) : n < owner);
+            if (before && is_open(o, n / 2, since)) owner = n;
+        }
+        if (owner == NONE) continue;
+        place_of_piece(o, owner / 2);
+        o->turning = owner / 2 < O.faces ? 0.0 : turning_of(owner / 2);
+    }
+    O.owned_in = epoch;
 }
 
 static const Member *member_of(int set, int obstacle) {

@@ -137,7 +137,7 @@ def test_what_hangs_on_joints_moves_as_in_python():
     scenes += [from_dict({**hung, **joints}) for joints in ({"string": apart}, {"pin": pins})]
     same_runs([load("cradle"), *scenes])
     lab = describe(load("perpendicular"))
-    for table, row, key in (
+    wrong = (
         ("string", {**above, "length": 0.01}, "string[0].length"),
         ("rod", {**above, "particle": 1}, "rod[0].particle"),
         ("pin", {**above, "other": 0}, "pin[0].other"),
@@ -145,9 +145,10 @@ def test_what_hangs_on_joints_moves_as_in_python():
         ("string", {}, "string[0].from"),
         ("string", {**above, "over": [0.0, 0.5]}, "string[0].over"),
         ("spring", above, "spring[0].stiffness"),
-    ):
-        answer = ask("bits.mjs", {"lab": lab, "scenes": [{**BALL, table: [row]}]})["scenes"][0]
-        assert answer["fault"]["key"] == key, table
+    )
+    given = [{**BALL, table: [row]} for table, row, _ in wrong]
+    answers = ask("bits.mjs", {"lab": lab, "scenes": given})["scenes"]
+    assert [answer["fault"]["key"] for answer in answers] == [key for *_, key in wrong]
 
 
 def test_what_waits_for_a_touch_acts_as_in_python():
@@ -213,6 +214,6 @@ def test_boxes_and_polygons_move_as_in_python():
     same_runs([load("domino-gate"), *map(from_dict, scenes)])
 
 
-@pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [8, pytest.param(200, marks=pytest.mark.slow)])
 def test_it_runs_scenes_with_any_keys_as_python_does(count):
     same_runs([from_dict(sandbox.tables(seed)) for seed in range(count)])

@@ -18,7 +18,7 @@ from chutelab.studies import design
 from chutelab.studies.design import constrained, minimize, solve
 from chutelab.studies.design.evaluation import Span, measured
 from chutelab.studies.design.searches import Fit, Found, Wishes, search
-from shared import call
+from shared import call, seeds
 from test_repeats import CROWD
 
 A, B = Span("a", "", 0.0, 40.0, None), Span("b", "", 0.0, 1.0, None)
@@ -92,7 +92,7 @@ def test_the_error_that_is_told_is_how_far_answers_are_off(function, noise, wish
     assert np.all(told < 8.0 * off + 0.0025 * np.array([40.0, 1.0])), (off, told)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", seeds(1, 2))
 def test_beside_a_jump_the_value_that_is_told_is_that_of_runs(seed):
     """The work of a belt falls with the angle, until from 22° on the plate is no longer met."""
 

@@ -1,6 +1,7 @@
 """Surfaces that are solid from one side: what comes the other way passes, as if there was none."""
 
 from dataclasses import replace
+from itertools import product
 from math import cos, radians, sin, sqrt
 
 import numpy as np
@@ -48,11 +49,13 @@ def told(recording):
     )]  # fmt: skip
 
 
-@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(
-    ("engine", "interact"),
-    [("contact", False), ("contact", True), ("pymunk", False),
-     pytest.param("pymunk", True, marks=pytest.mark.slow)],
+    ("engine", "interact", "way"),
+    [
+        pytest.param(*one, marks=() if one[0] == "contact" or one[1:] == (False, "left")
+                     else pytest.mark.slow)
+        for one in product(("contact", "pymunk"), (False, True), WAYS)
+    ],
 )  # fmt: skip
 def test_a_ball_thrown_through_a_line_comes_down_on_it(way, interact, engine):
     """From d below at √(2 g h) it is r above again, from above, at (v + √(v² - 2 g (d + r)))/g."""

@@ -459,10 +459,7 @@ def test_pymunk_for_what_exact_does_at_once_is_noticed(brief):
 
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=() if name in (*LONE, "stream") else pytest.mark.slow)
-        for name in sc.shipped()
-    ],
+    [pytest.param(name, marks=() if name in LONE else pytest.mark.slow) for name in sc.shipped()],
 )
 def test_no_shipped_scene_has_a_warning(name):
     assert look(name).advice == ()

@@ -353,7 +353,7 @@ def depth(outline, points):
 def test_a_polygon_is_refused_exactly_where_a_surface_passes_through_it(kind):
     """Of random boxes and triangles, against many points of the surface."""
     rng, told = np.random.default_rng(1), {True: 0, False: 0}
-    for draw in range(150):
+    for draw in range(75):
         size, turn = rng.uniform(0.02, 0.5, 2), rng.uniform(-np.pi, np.pi)
         corners = size * [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
         shape = {"shape": "box", "size": size.tolist()}
@@ -391,7 +391,7 @@ def test_a_polygon_is_refused_exactly_where_a_surface_passes_through_it(kind):
         if deep > 1e-8 or deep < -gap:
             told[deep > 0.0] += 1
             assert is_refused(tables) == (deep > 0.0), (draw, deep)
-    assert min(told.values()) > 20
+    assert min(told.values()) > 10
 
 
 def test_a_long_box_is_refused_across_an_arc_and_free_above_two_posts():

@@ -202,7 +202,7 @@ def kinds(x=0.0, until='"settled"'):
         (scene.find("spoon").read_text("utf-8"), True),
         (kinds(), True),
         (kinds(until="0.45"), True),
-        (kinds(x=20.0), False),
+        pytest.param(kinds(x=20.0), False, marks=pytest.mark.slow),
         (kinds(x=1000.0), False),
     ],
     ids=["slip", "spoon", "kinds", "for a time", "aside", "far off"],

@@ -225,7 +225,7 @@ def check(family, name, seeds):
     assert len(off) <= round((1.0 - share) * count) + (share < 1.0), off
 
 
-FEW = {"oddities": 8, "bodies": 4, "hinges": 3, "bowls": 1, "chains": 7, "chains, exact": 7}
+FEW = {"oddities": 8, "bodies": 3, "hinges": 2, "bowls": 1, "chains": 7, "chains, exact": 7}
 MANY = {"oddities": 100, "bodies": 40, "hinges": 24, "bowls": 8, "chains": 80, "chains, exact": 80}
 
 

@@ -167,9 +167,11 @@ FULL = 2000
 """Bytes that a file may have where the disk is full."""
 
 
-@pytest.mark.parametrize("name", ["run", "sweep", pytest.param("solve", marks=pytest.mark.slow),
-                                  *(pytest.param(n, marks=pytest.mark.slow) for n in ("show",
-                                  "jobs", "live", "figure"))])  # fmt: skip
+@pytest.mark.parametrize(
+    "name",
+    ["run", *(pytest.param(n, marks=pytest.mark.slow)
+              for n in ("sweep", "solve", "show", "jobs", "live", "figure"))],
+)  # fmt: skip
 def test_a_full_disk(name, tmp_path):
     prepared(tmp_path)
 

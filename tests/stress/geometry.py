@@ -144,7 +144,7 @@ def _contact():
         Case("contact-corner", group, nook),
         # All at one place and time: they wait for each other.
         Case("contact-crowd", group, crowded, engines=CROWD, slow=("pymunk",)),
-        Case("contact-crowd-tight", group, tight, engines=CROWD, slow=("pymunk",)),
+        Case("contact-crowd-tight", group, tight, engines=CROWD, slow=CROWD),
     ]
 
 

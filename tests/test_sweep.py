@@ -17,6 +17,7 @@ from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results import Kind, Recording
 from chutelab.results.ledger import ledger
+from chutelab.results.quantities import compare
 from chutelab.results.recorder import Recorder
 from chutelab.scene import load, parse
 from chutelab.scene.overrides import value_at
@@ -632,6 +633,22 @@ def test_a_map_is_hatched_where_the_plate_is_missed():
     points = np.column_stack([swept.columns["incoming.speed"], swept.columns["plate.restitution"]])
     inside = hatched.get_paths()[0].contains_points(points)
     assert inside.tolist() == passes(points[:, 0]).tolist()
+
+
+def test_of_what_comes_down_on_the_pulley_again_all_say_what_holds_until_then():
+    """Thrown up at 60° with v² < g (R + r)/cos 60°: it leaves where the belt ends, at its speed."""
+    given = load("perpendicular", ["incoming.incline_deg=60", "incoming.length=0.5"])
+    speeds = [0.8, 1.2, 1.391]
+    swept = sweep(given, [f"incoming.speed={','.join(map(str, speeds))}"])
+    for speed, told in zip(speeds, swept.columns["error.max"], strict=True):
+        found = compare(simulate(given, {"incoming.speed": speed}))
+        assert list(found.errors) == ["phi1", "v1"]
+        assert found.theory["phi1"] == pytest.approx(-np.pi / 3.0, rel=1e-14)
+        assert found.theory["v1"] == pytest.approx(speed, rel=1e-14)
+        assert told == pytest.approx(found.max, abs=1e-15)
+        assert found.max < 1e-14
+        words = " ".join(str(found).split())
+        assert "from here on; early contact: pulley: the flight comes down on it again" in words
 
 
 @pytest.mark.parametrize("count", [3, 9], ids=["lines", "map"])

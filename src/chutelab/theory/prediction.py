@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from math import nan, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -70,8 +71,8 @@ class Course:
         self.belt_height: float | None = None
         if out is not None and out.drop_from == "top":
             self.belt_height = self.belt.pulley_radius - out.drop
-        elif out is not None and np.isfinite(self.impact[1]):
-            self.belt_height = float(self.impact[1] - out.drop - self.radius)
+        elif out is not None and np.isfinite(height := self._height_at_plate()):
+            self.belt_height = height - out.drop - self.radius
         below = plate.below
         if below is None:
             below = 2.0
@@ -92,6 +93,21 @@ class Course:
         self.lines += lines
         end = self.belt.pulley_radius * self.above
         self.belt_line: Line = "incoming", end - self.belt.length * self.along, end
+
+    def _height_at_plate(self) -> float:
+        """Return the height of the centre on the plate's line, m, as if the pulley were not there.
+
+        A machine is built so. The equations end before where the flight comes down on the pulley.
+        """
+        if np.isfinite(self.impact[1]):
+            return float(self.impact[1])
+        flight, sin = self.separation, -float(self.normal[1])
+        gap = float((flight.position - self.pivot) @ self.normal) - self.radius
+        closing = -float(flight.velocity @ self.normal)
+        square = closing * closing - 2.0 * flight.gravity * sin * gap
+        t = 2.0 * gap / (closing + sqrt(square)) if square > 0.0 else nan  # Eq. (5)
+        y, v = float(flight.position[1]), float(flight.velocity[1])
+        return y + v * t - 0.5 * flight.gravity * t * t if t > 0.0 else nan
 
     def meets(self, claim: Reason, name: str, how: str) -> str:
         """Return the reason why the equations end at a surface."""

@@ -62,7 +62,7 @@ from chutelab.pictures.plots.scenery import (
     strobe_step,
     track_times,
 )
-from chutelab.pictures.plots.style import Picture, figures, say, spoken
+from chutelab.pictures.plots.style import Picture, figures, paid_words, say, spoken
 from chutelab.results import Recording
 from chutelab.results.quantities import need_recording
 from chutelab.util.files import whole
@@ -248,9 +248,8 @@ class Stage:
             top = layout.view[1] + layout.view[3] - 0.06
             axes = self.figure.add_axes((0.765, 0.43, 0.225, top - 0.43))
             table = 0.73, 0.125, 0.26, 0.245
-            self.bars, column = bars(
-                axes, table, energies(recording, times), drives=paid_by(recording)
-            )
+            paid = paid_words(paid_by(recording))
+            self.bars, column = bars(axes, table, energies(recording, times), drives=paid)
             self.writings += column
         self._canvas = Canvas(self.figure)
         self._painters = [painter(artist) for artist, _ in self.moving]

@@ -347,13 +347,14 @@ def bars(
     column: tuple[float, float, float, float],
     balance: dict[str, Floats],
     *,
-    drives: str = "belt_work",
+    drives: str,
 ) -> tuple[list[Bar], list[Writing]]:
     """Return two stacked bars on `ax`, and figures with their names in a column.
 
     The column's left, bottom, width and height are shares of the picture. The ledger is as for
-    `stacks`; the highest bar sets the scale. The work of belts, drives and hinges is one block,
-    with the name `drives`. What a machine has none of has no row.
+    `stacks`; the highest bar sets the scale. The work of belts, drives, hinges, springs and hands
+    is one block, with the name `drives`; "" if there is none. What a machine has none of has no
+    row.
     """
     sides = stacks(balance)
     highest = float(np.max(sum(sides[0].values())))
@@ -376,21 +377,21 @@ def bars(
     for name in sides[0]:
         shown = [round(factor * value, 1) + 0.0 for value in balance[name].tolist()]
         absent = {
-            "belt_work": drives == "nothing", "spring": not balance[name].any(),
+            "belt_work": not drives, "spring": not balance[name].any(),
             "damper_loss": not balance[name].any(), "residual": not any(shown),
         }  # fmt: skip
         if not absent.get(name, False):
             rows[name] = shown
     line = height / max(ROWS, len(rows))
     for row, (name, shown) in enumerate(rows.items()):
-        told = drives if name == "belt_work" else name
+        told = drives if name == "belt_work" else say(f"ledger-{name}")
         said = [figures(value, ".1f") for value in shown]
         top = bottom + height - row * line
         key = Rectangle((left, top - 0.8 * line), 0.05 * width, 0.6 * line)
         key.set(color=style.ENERGY[name], transform=picture.transFigure)
         picture.add_artist(key)
         up = top - BASE * line
-        picture.text(left + 0.08 * width, up, say(f"ledger-{told}"), fontsize=style.SMALL)
+        picture.text(left + 0.08 * width, up, told, fontsize=style.SMALL)
         across, along = picture.transFigure.transform((left + width, 1.0 - up))
         writings.append(Writing(style.SMALL, picture.dpi, across, along, "rs", said))
     return drawn, writings

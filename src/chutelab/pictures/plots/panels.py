@@ -305,7 +305,10 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
         linewidth=0.0,
     )
     (line,) = ax.plot(times, factor * supplied, color=style.INK, lw=1.6, gid="supplied")
-    line.set(linestyle=(0, (4, 1.5)), label=say(f"supplied-{paid_by(recording)}"))
+    paid = ", ".join(say(f"by-{part}") for part in paid_by(recording))
+    told = say("supplied", by=paid) if paid else say("supplied-nothing")
+    told = "\n".join(fill(line, 28) for line in told.splitlines())
+    line.set(linestyle=(0, (4, 1.5)), label=told)
     residual = float(balance["residual"][-1])
     title = say("ledger")
     if details or abs(residual) > SHOWN * np.abs(supplied).max():

@@ -14,8 +14,8 @@ from chutelab.core import number as layout_number
 from chutelab.machine.parts import Mover
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.arrival import arrivals
+from chutelab.results.ledger import ledger
 from chutelab.results.quantities import each
-from chutelab.results.record import PARTICLES
 from chutelab.results.stream import FEWEST
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.errors import InputError
@@ -193,7 +193,7 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     balance["potential"] = np.maximum(lifted, 0.0)
     balance["start"] = at_release[released] - weight * zero
     hung = [one for one in recording.machine.movers if one.hinge]
-    if hung and paid_by(recording) != "hinges":
+    if hung and "hinges" not in paid_by(recording):
         balance |= {"spring": np.zeros_like(times), "damper_loss": np.zeros_like(times)}
         for one in hung:
             _hang(balance, one, recording, times)
@@ -296,24 +296,25 @@ def drawn_tracks(recording: Recording) -> Ints:
     return chosen[recording.released[chosen]]
 
 
-def paid_by(recording: Recording) -> str:
-    """Return the name of the energy input in pictures.
+def paid_by(recording: Recording) -> tuple[str, ...]:
+    """Return what gives or takes energy in pictures, beside the release: one row for all of it.
 
-    It is "drives", "belt_work", "forces" of springs and hands, "nothing", or "hinges". Work by hand
-    on plates, and in Pymunk the loss at stops, is known only for whole runs. Then
-    hinges have no energies of their own, but give or take energy.
+    First "drives", "belt_work" or "hinges" (with drives), then "springs" of joints, and "pushes" by
+    hand. What a hand does to plates that it turns, and in Pymunk the loss at stops, is known only
+    for whole runs. Then hinges have no energies of their own, but give or take energy.
     """
     machine = recording.machine
     hinges = [one.hinge for one in machine.movers if one.hinge]
     untold = not len(recording.stopped)
-    if any(one.steered or (untold and np.isfinite(one.stops).any()) for one in hinges):
-        return "hinges"
-    if any(one.hinge is None or any(one.hinge.motor) for one in machine.movers):
-        return "drives"
-    if any(piece.speed for piece in machine.pieces):
-        return "belt_work"
-    forces = recording.by_surface[recording.surfaces.index(PARTICLES)][0]
-    return "forces" if forces or len(recording.springs) else "nothing"
+    driven = any(one.hinge is None or any(one.hinge.motor) for one in machine.movers)
+    given = {
+        "hinges": any(one.steered or (untold and np.isfinite(one.stops).any()) for one in hinges),
+        "drives": driven,
+        "belt_work": any(piece.speed for piece in machine.pieces),
+    }
+    forces = {"springs": len(recording.springs), "pushes": ledger(recording).push_work}
+    first = [name for name, there in given.items() if there][:1]
+    return (*first, *(name for name, there in forces.items() if there))
 
 
 POSES = 61

@@ -7,7 +7,7 @@ figure with a headline that can be written to a file and shown in a notebook.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from io import BytesIO
@@ -94,6 +94,13 @@ def __getattr__(name: str) -> Any:
 def say(key: str, /, **values: object) -> str:
     """Return the text ``picture-KEY`` in the present language, filled in."""
     return spoken().say(f"picture-{key}", **values)
+
+
+def paid_words(parts: Sequence[str]) -> str:
+    """Return the name of the work of several parts, see `scenery.paid_by`; "" of none."""
+    if tuple(parts) == ("drives",):
+        return say("ledger-drives")
+    return ", ".join(say(f"by-{part}") for part in parts)
 
 
 def spoken() -> Words:

@@ -745,3 +745,25 @@ def test_on_a_phone_one_card_or_drawer_lies_under_the_picture(shown, name, size)
     page.set_viewport_size({"width": 1366, "height": 768})
     playwright.expect(page.locator(".bench #tool-tape")).to_be_visible()
     assert page.locator("#panels > .card:visible").count() > 2
+
+
+def test_the_bar_of_the_scale_is_in_no_drum(shown):
+    """On a phone, where it is half as long as elsewhere: all of it is further out than the wall."""
+    phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+    page = shown("drum", **phone)
+    found = page.evaluate("""() => {
+      const box = (which) => document.querySelector(which).getBoundingClientRect();
+      const { view } = chutelab.stage, { left, top } = box("#stage"), { scene } = chutelab.lab;
+      const [x, y] = scene.surface[0].pivot;
+      const wall = scene.surface[0].points.map(([u, v]) => Math.hypot(u - x, v - y) * view.scale);
+      const { left: west, right: east, top: north, bottom: south } = box(".scale");
+      const middle = [left + view.px(x), top + view.py(y)];
+      return { wall: Math.max(...wall), middle, west, east, north, south,
+        said: document.querySelector(".scale text").textContent };
+    }""")
+    across = max(found["west"] - found["middle"][0], found["middle"][0] - found["east"], 0.0)
+    up = max(found["north"] - found["middle"][1], found["middle"][1] - found["south"], 0.0)
+    assert np.hypot(across, up) > found["wall"]
+    assert found["west"] >= 0.0
+    long = float(found["said"].removesuffix(" m")) * page.evaluate("chutelab.stage.view.scale")
+    assert found["east"] - found["west"] == pytest.approx(long, abs=4.0)

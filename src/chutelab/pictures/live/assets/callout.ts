@@ -111,8 +111,19 @@ function passed({ view }: Stage, { tracks, begin, end }: Recording): Point[] {
       .flatMap((state): Point[] => (state ? [[view.px(state.x), view.py(state.y)]] : [])));
 }
 
-/** Place of a box that covers neither surfaces and tracks nor taken boxes: from a corner up, then
- * further to the right; null if there is none.
+/** Discs in which parts turn all the time, px: their middles and radii. What a drum holds comes
+ * everywhere in it. */
+function drums({ lab: { machine }, view }: Stage, lines: Named[]): [Point, number][] {
+  return (machine?.movers ?? []).filter(({ turn }) => turn).map(({ surface, pivot: [x, y] }) => {
+    const [u, v] = [view.px(x), view.py(y)];
+    const own = lines.filter(([name]) => name === machine?.surfaces[surface]);
+    return [[u, v], Math.max(0, ...own.flatMap(([, points]) =>
+      points.map(([px, py]) => Math.hypot(px - u, py - v))))];
+  });
+}
+
+/** Place of a box that covers neither surfaces and tracks nor taken boxes, and is in no drum: from
+ * a corner up, then further to the right; null if there is none.
  * @param size width and height, px
  * @param corner its lower left one, px
  * @returns its lower left corner */
@@ -120,7 +131,8 @@ function freePlace(stage: Stage, size: Point, corner: Point, taken: Stage["cover
   const [wide, high] = size, [left, bottom] = corner;
   const { view, lab } = stage, { recording } = lab, { free } = view;
   const path = recording ? stage.trackPoints(recording, 4 / view.scale) : [];
-  const there = [...surfaceLines(stage).map(([, line]) => line),
+  const lines = surfaceLines(stage), turning = drums(stage, lines);
+  const there = [...lines.map(([, line]) => line),
     ...path.map((points) => points.map(({ x, y }) => [view.px(x), view.py(y)] as Point))]
     .flatMap(along).concat(recording?.machine.interact ? passed(stage, recording) : []);
   for (let x = left; x + wide < free.right; x += ASIDE) {
@@ -128,7 +140,9 @@ function freePlace(stage: Stage, size: Point, corner: Point, taken: Stage["cover
       const meets = (u: number, v: number) => u > x - CLEAR && u < x + wide + CLEAR
         && v > y - high - CLEAR && v < y + CLEAR;
       const isFree = taken.every((box) => box.left > x + wide + CLEAR || box.right < x - CLEAR
-        || box.top > y + CLEAR || box.bottom < y - high - CLEAR);
+        || box.top > y + CLEAR || box.bottom < y - high - CLEAR)
+        && turning.every(([[u, v], radius]) => Math.hypot(Math.max(x - u, u - x - wide, 0),
+          Math.max(y - high - v, v - y, 0)) > radius + CLEAR);
       if (isFree && !there.some(([u, v]) => meets(u, v))) return [x, y] as Point;
     }
   }

@@ -238,10 +238,10 @@ class Scenery {
     }
   }
 
-  /** Draw grid lines at round numbers of metres, and the scale bar. */
-  drawGround(left: number, low: number) {
+  /** Draw grid lines at round numbers of metres, and the scale bar, a share of a mesh long. */
+  drawGround(left: number, low: number, share: number) {
     const { view, ground } = this, { width, height, scale, mesh: step } = view;
-    const now = JSON.stringify([view.x, view.y, scale, width, height, left, low]);
+    const now = JSON.stringify([view.x, view.y, scale, width, height, left, low, share]);
     if (now === this.grid) return;
     this.grid = now;
     const lines = (offset: number) => {
@@ -258,8 +258,8 @@ class Scenery {
       }
       return path;
     };
-    const long = step * scale, y = low;
-    const [value, unit] = step < 0.01 ? [1e3 * step, "mm"] : [step, "m"];
+    const size = share * step, long = size * scale, y = low;
+    const [value, unit] = size < 0.01 ? [1e3 * size, "mm"] : [size, "m"];
     const text = svg("text", { x: left + 0.5 * long, y: y - 8, "text-anchor": "middle" },
       `${this.words.plain(Number(value.toPrecision(3)))} ${unit}`);
     ground.replaceChildren(

@@ -243,14 +243,28 @@ class Stage {
     if (this.view.width < 2) return;
     const { machine, scene } = this.lab;
     if (machine) this.scenery.draw(machine, scene);
-    this.long = this.view.mesh * this.view.scale;
-    // The scale bar does not move during a drag.
-    if (!this.held) this.scaleAt = freePlace(this, [this.long, ABOVE], this.corner) ?? this.corner;
-    this.scenery.drawGround(...this.scaleAt);
+    this.placeScale();
+    this.scenery.drawGround(...this.scaleAt, this.shown);
     this.drawTracks();
     this.placeHandles();
     this.paint();
     for (const draw of this.drawers) draw();
+  }
+
+  /** Share of a mesh that the scale bar shows. */
+  shown = 1;
+
+  /** Find a place for the scale bar, which does not move during a drag: half as long a one where
+   * there is more room. */
+  placeScale() {
+    const whole = this.view.mesh * this.view.scale;
+    if (!this.held) {
+      const found = [1, 0.5].map((share) =>
+        [share, freePlace(this, [share * whole, ABOVE], this.corner)] as const);
+      const [share, place] = found.find(([, at]) => at) ?? [1, this.corner];
+      [this.shown, this.scaleAt] = [share, place ?? this.corner];
+    }
+    this.long = this.shown * whole;
   }
 
   /** Draw tracks only now and then: while a crowd is played they change little between frames. */

@@ -731,6 +731,30 @@ def test_a_machine_of_twelve_parts_is_built_by_keyboard_alone(empty, tmp_path):
     assert same_bits(page, tmp_path, 0.8) > 100
 
 
+def test_the_dashed_example_goes_at_the_first_stroke_and_comes_back_if_nothing_is_drawn(empty):
+    page = empty()
+    example = page.locator("#stage > .sketch")
+    expect(example).to_be_visible()
+    page.click("#part-line")
+    expect(example).to_be_visible()
+    box = page.locator("#stage").bounding_box()
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    expect(example).to_be_hidden()
+    page.mouse.up()
+    page.keyboard.press("Escape")
+    expect(example).to_be_visible()
+    page.click("#part-line")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 80, y + 40)
+    page.mouse.up()
+    page.evaluate(DONE)
+    expect(example).to_be_hidden()
+    assert len(given(page)["surface"]) == 1
+
+
 @pytest.mark.slow
 def test_the_first_machine_and_the_examples_are_one_click_away(empty):
     page = empty("de")

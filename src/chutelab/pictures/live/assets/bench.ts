@@ -630,6 +630,8 @@ class Bench {
   sketch() {
     const { mode, stage, chip, words, draft } = this, { view } = stage;
     draft.replaceChildren();
+    // The example of an empty page makes room.
+    stage.home.classList.toggle("begun", this.points.length > 0);
     this.chip.hidden = mode === null;
     if (!mode) {
       stage.magnet.classList.remove("on");

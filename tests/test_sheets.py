@@ -1,15 +1,19 @@
 """The sheets of lessons: printed, and as files in Markdown, HTML and PDF."""
 
 import re
+from io import BytesIO
 
 import pytest
 import typst
 from PIL import Image
+from pypdf import PdfReader
 
+from chutelab.classroom.exercises import told
 from chutelab.classroom.lessons import read
 from chutelab.classroom.lessons.building import start
 from chutelab.classroom.lessons.sheets import SHEETS, printed, sheet
 from chutelab.classroom.lessons.texts import as_text, html_of, parsed, typeset, without_tex
+from chutelab.util.words import words
 from shared import Page, chutelab, find, lessons, some
 
 
@@ -86,6 +90,18 @@ def test_every_sheet_is_a_page_that_is_whole(number, which):
 )
 def test_every_sheet_is_a_pdf_of_a_few_pages(number, which):
     assert 1 <= pages(printed(find(number), which, "pdf")) <= 4
+
+
+@pytest.mark.parametrize("number", some([4, 7, 13]))
+@pytest.mark.parametrize("language", some(["en", "de"], 2))
+def test_the_heading_of_your_numbers_is_on_the_page_of_their_table(number, language):
+    lesson, say = find(number, language), words(language).say
+    found = PdfReader(BytesIO(printed(lesson, "student", "pdf"))).pages
+    texts = [" ".join(page.extract_text().split()) for page in found]
+    (there,) = [n for n, text in enumerate(texts) if say("step-numbers") in text]
+    first = told(lesson.name, language).questions[0]
+    for said in (say("sheet-numbers"), say("sheet-question"), f"1. {first.title}"):
+        assert said in texts[there]
 
 
 @pytest.mark.parametrize(

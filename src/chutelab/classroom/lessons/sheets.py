@@ -14,6 +14,7 @@ import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from html import escape
 from importlib.util import find_spec
+from itertools import zip_longest
 from pathlib import Path
 from string import Template
 from tempfile import TemporaryDirectory
@@ -335,9 +336,12 @@ def _text(text: str) -> str:
 
 
 def _blocks(nodes: Iterable[SyntaxTreeNode], asked: Sequence[SyntaxTreeNode]) -> str:
-    """Return blocks of Markdown in Typst's language, with room to write after those in `asked`."""
+    """Return blocks of Markdown in Typst's language, with room to write after those in `asked`.
+
+    What introduces a table or commands stays on their page.
+    """
     made = []
-    for node in nodes:
+    for node, after in zip_longest(nodes := list(nodes), nodes[1:]):
         match node.type:
             case "heading":
                 made.append(f"#heading(level: {node.tag[1]})[{_inline(node)}]")
@@ -367,7 +371,9 @@ def _blocks(nodes: Iterable[SyntaxTreeNode], asked: Sequence[SyntaxTreeNode]) ->
             case "blockquote":
                 made.append(f"#quote(block: true)[{_blocks(node.children, asked)}]")
             case _:
-                made.append(f"{_inline(node)}{'#room' * (node in asked)}")
+                text = f"{_inline(node)}{'#room' * (node in asked)}"
+                leads = after is not None and after.type in ("table", "fence", "code_block")
+                made.append(f"#block(spacing: 1em, sticky: true)[{text}]" if leads else text)
     return "\n\n".join(made)
 
 

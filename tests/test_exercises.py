@@ -11,7 +11,15 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from chutelab.classroom.exercises import EXERCISES, ExerciseError, Values, Verdict, find, lesson
+from chutelab.classroom.exercises import (
+    EXERCISES,
+    ExerciseError,
+    Values,
+    Verdict,
+    find,
+    lesson,
+    told,
+)
 from chutelab.classroom.exercises.exercise import (
     Case,
     Exercise,
@@ -519,3 +527,18 @@ def test_notebooks_are_shipped_without_outputs_and_answers_and_ask_every_questio
     for number, case in enumerate(draw(EXERCISES[name], "your name")[1], start=1):
         assert f"task.check({number}, answer_{number})" in text
         assert repr(case.right) not in text, number
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_indices_are_below_the_line_as_in_the_lessons(language):
+    """Names in Python, in code and between braces, keep their digits."""
+    for name in NAMES:
+        exercise = told(name, language)
+        texts = [exercise.title, exercise.story, *(one.meaning for one in exercise.parameters)]
+        texts += [one.symbol for one in exercise.parameters]
+        for asked in exercise.questions:
+            texts += [asked.title, asked.text, asked.working, *asked.hints]
+            texts += [part for one in asked.mistakes for part in (one.called, one.says)]
+        for text in texts:
+            plain = re.sub(r"\{[^}]*\}|`[^`]*`", "", text)
+            assert not re.findall(r"(?<![A-Za-z0-9_])[A-Za-zφ]{1,2}\d", plain), text

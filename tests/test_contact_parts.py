@@ -463,25 +463,37 @@ def test_a_gate_opens_and_shuts_again_to_the_instant(engine):
         assert y == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.mark.parametrize("x", [-0.025, -0.01, 0.01])
-@pytest.mark.parametrize("side", [1.0, -1.0])
-@pytest.mark.parametrize("shape", [{"shape": "box", "size": [0.06, 0.06]}, {"radius": 0.03}])
-def test_where_a_gate_has_opened_all_is_as_if_it_had_never_been(shape, side, x):
-    """The end of a floor that an arc continued smoothly is a tip again; boxes fell through it."""
-    floor = {"name": "floor", "from": [0.0, 0.0], "to": [0.5, 0.0], "friction": 0.3}
-    gate = {"name": "gate", "center": [0.0, 0.2 * side], "radius": 0.2, "from_deg": 180.0,
-            "to_deg": 270.0, "opens_at": 0.005}  # fmt: skip
-    if side < 0.0:
-        gate |= {"from_deg": 90.0, "to_deg": 180.0}
-    tables = {"particle": {"mass": 0.1, "spin": True} | shape,
-              "stream": {"at": [x, 0.2], "velocity": [0.0, 0.0]},
-              "run": {"until": 0.4}}  # fmt: skip
-    with_gate, without = (
+FLOOR = {"name": "floor", "from": [0.0, 0.0], "to": [0.5, 0.0], "friction": 0.3}
+
+
+def beside_a_gate(shape, x, **gate):
+    """Where a particle ends that is dropped near the end of FLOOR, with such a gate and without."""
+    tables = {"particle": {"mass": 0.1, "spin": True} | shape, "run": {"until": 0.4},
+              "stream": {"at": [x, 0.05], "velocity": [0.0, 0.0]}}  # fmt: skip
+    runs = [
         chutelab.simulate(tables | {"surface": surfaces}, engine="contact")
-        for surfaces in ([floor, gate], [floor])
-    )
-    assert not with_gate.laws
-    assert np.allclose(with_gate.ends()[1]["position"], without.ends()[1]["position"], atol=1e-9)
+        for surfaces in ([FLOOR, {"name": "gate", "radius": 0.2} | gate], [FLOOR])
+    ]
+    assert not any(recording.laws for recording in runs)
+    return [recording.ends()[1]["position"][0] for recording in runs]
+
+
+@pytest.mark.parametrize("shape", [{"shape": "box", "size": [0.06, 0.06]}, {"radius": 0.03}])
+def test_where_a_gate_has_opened_all_is_as_if_it_had_never_been(shape):
+    """The end of a floor that an arc continued smoothly is a tip again; boxes fell through it."""
+    above = {"center": [0.0, 0.2], "from_deg": 180.0, "to_deg": 270.0}
+    below = {"center": [0.0, -0.2], "from_deg": 90.0, "to_deg": 180.0}
+    for arc in (above, below):
+        for x in (-0.02, -0.01, 0.01):
+            assert np.allclose(*beside_a_gate(shape, x, **arc, opens_at=0.005), atol=1e-9)
+
+
+@pytest.mark.parametrize("shape", [{"shape": "box", "size": [0.06, 0.06]}, {"radius": 0.03}])
+def test_what_a_gate_has_closed_on_still_lies_on_the_surface_that_it_continues(shape):
+    """It ignores the gate, which is no face of the floor for it then."""
+    for x in (-0.02, -0.012):
+        gate = {"center": [0.0, 0.2], "from_deg": 180.0, "to_deg": 270.0, "closes_at": 0.08}
+        assert np.allclose(*beside_a_gate(shape, x, **gate), atol=1e-3)
 
 
 def drawn_piece(rng, name, angle):

@@ -142,10 +142,12 @@ static inline int is_beside(const Surface *s, const Disk *d) {
 }
 /* ... and does not ignore it. */
 static inline int is_near(const Surface *s, const Disk *d) { return is_beside(s, d) && !is_spared(s, d); }
-/* The piece that continues smoothly beyond an end of a surface in this step, for a circle one that leads to it; or -1. */
+/* The piece that continues smoothly beyond an end of a surface in this step, for all particles, for a circle one that leads
+   to it; or -1. */
 static inline int mate_of(const Surface *s, int n) {
     int mate = s->mates[n];
-    return mate >= 0 && s->ledges[n] <= W.ledge && W.surfaces[mate].there ? mate : -1;
+    if (mate < 0 || s->ledges[n] > W.ledge) return -1;
+    return W.surfaces[mate].there && !W.surfaces[mate].ignored ? mate : -1;
 }
 /* Whether two surfaces, in the numbers of `Contact.j`, continue each other; whether two partners of a disk are the same
    or do so. */

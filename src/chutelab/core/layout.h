@@ -166,6 +166,7 @@ typedef struct {
     int one_sided;          /* [in] 1: solid on its left (an arc: outside) only; -1: on the other side only; 0: on both */
     int chain;              /* the next of the pieces that share its column: they continue at its ends */
     int there;              /* enum There: whether it exists in this step */
+    int ignored;            /* whether it is a gate that has closed on particles, which ignore it */
     int mover;              /* row of `movers` if it moves, else -1 */
     int hollows[2];         /* of a segment: sides to which another segment continues at its ends: 1 left, 2 right */
     double box[4];          /* m; left, bottom, right, top; of all that it sweeps in this step */

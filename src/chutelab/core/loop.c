@@ -173,10 +173,12 @@ static double set_gates(double t) {
         s->there = there;
         /* Pieces of a chain share a column of `spared`. */
         int is_first = s->gate >= 0 && (k == 0 || s->gate != s[-1].gate);
+        s->ignored = 0;
         for (int i = W.low; i < W.high && is_first; i++) {
             if (!is_live(W.disks + i)) continue;
             if (*spared_by(s, W.disks + i) == CLEARS) *spared_by(s, W.disks + i) = 0;
             spare(W.disks + i, s, t);
+            s->ignored |= !s->one_sided && *spared_by(s, W.disks + i) != 0;
         }
     }
     if (changed) find_crowns();

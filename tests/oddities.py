@@ -6,10 +6,11 @@
 - Particles are disks, spheres, boxes down to a thirtieth of their width, and polygons of 3 to 8
   corners; they stick together or to surfaces (cohesion), roll with friction, yield when fast.
 - Strings are tight, slack or over a pulley; rods, springs, pins. Gravity from any side, none; air.
+- `on_conveyors` has conveyors beside them.
 - `shaken_bowl` has 33 to 60 disks in an arc that shakes, turns, or both.
 
-What it never draws: the incoming and outgoing belt, plates, conveyors, fills, pegs in rows,
-materials, gases; scenes of more than five particles in anything but a bowl.
+What it never draws: the incoming and outgoing belt, plates, fills, pegs in rows, materials, gases;
+scenes of more than five particles in anything but a bowl.
 """
 
 from math import cos, pi, radians, sin
@@ -35,6 +36,27 @@ def tables(seed):
             build(from_dict(drawn))
         except SceneError:
             # Two released in one place, or one in a surface.
+            continue
+        return drawn
+
+
+def on_conveyors(seed):
+    """Return such a scene with one or two conveyors in it, level or inclined, at up to 3 m/s."""
+    dice = Dice(np.random.default_rng([9, seed]))
+    while True:
+        belts = []
+        for _ in range(dice.whole(1, 2)):
+            x, y, slope = dice.number(-0.3, 0.1), dice.number(-0.3, 0.0), dice.number(-0.5, 0.5)
+            length = dice.number(0.1, 0.4)
+            end = [x + length * cos(slope), y + length * sin(slope)]
+            row = {"name": f"belt{len(belts)}", "from": [x, y], "to": end,
+                   "pulley_radius": dice.number(0.01, 0.05), "speed": dice.number(-3, 3),
+                   "restitution": dice.number(0, 0.9), "friction": dice.number(0, 1)}  # fmt: skip
+            belts.append(row)
+        drawn = {**Oddities(dice.rng).tables, "conveyor": belts}
+        try:
+            build(from_dict(drawn))
+        except SceneError:
             continue
         return drawn
 

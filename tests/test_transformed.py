@@ -3,7 +3,7 @@
 Each machine is drawn, run, transformed and run again; the law of the transformation, undone, gives
 the first result. What rounding does grows as a push of 1e-9 grows. Where particles lie on
 something, the length of steps matters, and that depends on the frame a little: so machines are also
-run with other steps, all have to agree to the effect of these, and most to rounding.
+pushed and run with other steps, and each has to agree to the effect of these.
 
 With all masses doubled or all times halved, results had the same bits in 700 draws (contact engine;
 9 of 10 with times halved in the exact one). With lengths scaled by 4 or 1/16 they had in two of
@@ -33,6 +33,7 @@ from transformed import Law, alone, mirrored, reordered, resized, scaled, shifte
 
 FAMILIES = {
     "oddities": (oddities.tables, "contact"),
+    "conveyors": (oddities.on_conveyors, "contact"),
     "bodies": (partial(bodies, both=True), "contact"),
     "hinges": (hung, "contact"),
     "bowls": (oddities.shaken_bowl, "contact"),
@@ -51,13 +52,14 @@ ROUNDING = 1e-11
 """m and m/s; of coordinates of 1 m and speeds of 10 m/s, times some thousand operations."""
 STEPS = (0.77, 0.29)
 """Shares of the usual step."""
+SENSITIVE = (6.0, 5.0)
+"""Times the effects of rounding and of another step by which a machine may differ once transformed.
+Boxes round things depend on the frame, and with them where steps begin and end."""
 LOOSE, GROWS = 1e-2, 1e-5
 """m, m/s, share of the energy: what a lasting contact may add at last, as where a body leaves a
 corner one step later, and what it may add earlier, which grows."""
-MOST = {"oddities": 0.9, "bodies": 0.8, "hinges": 0.8, "bowls": 0.65, "chains": 0.95,
-        "chains, exact": 0.95}  # fmt: skip
-"""Share of machines that have to agree to rounding. Turned by 37 degrees, when axes no longer go
-with boxes round things, a tenth fewer; doubled or hastened, all."""
+FEW_OFF = 40
+"""Of so many machines one may differ by that instead: other steps did not show how it would."""
 
 
 def doubled(tables):
@@ -216,30 +218,37 @@ def check(family, name, seeds):
         count += 1
         differs = apart(state(run, law), it.end)
         assert {broken.law for broken in run.laws} <= it.broken
-        allowed = LOOSE + GROWS * it.growth + 3.0 * it.step
-        assert differs < allowed, (seed, differs, it.growth, it.step)
-        if differs > it.growth * ROUNDING:
-            off[seed] = differs
-    share = 1.0 if name in ("doubled", "hastened") else MOST[family] - 0.1 * ("37" in name)
-    # One more: of few it may be the first.
-    assert len(off) <= round((1.0 - share) * count) + (share < 1.0), off
+        loose = LOOSE + GROWS * it.growth + 3.0 * it.step
+        assert differs < loose, (seed, differs, it.growth, it.step)
+        # Steps follow masses and times.
+        rounding, step = SENSITIVE if name not in ("doubled", "hastened") else (1.0, 0.0)
+        if differs > rounding * it.growth * ROUNDING + step * it.step:
+            off[seed] = differs, it.growth, it.step
+    assert len(off) <= count // FEW_OFF, off
 
 
-FEW = {"oddities": 8, "bodies": 3, "hinges": 2, "bowls": 1, "chains": 7, "chains, exact": 7}
-MANY = {"oddities": 100, "bodies": 40, "hinges": 24, "bowls": 8, "chains": 80, "chains, exact": 80}
+FEW = {"oddities": 8, "conveyors": 4, "bodies": 3, "hinges": 2, "bowls": 1, "chains": 7,
+       "chains, exact": 7}  # fmt: skip
+MANY = {"oddities": 100, "conveyors": 60, "bodies": 40, "hinges": 24, "bowls": 8, "chains": 80,
+        "chains, exact": 80}  # fmt: skip
+CASES = [
+    (family, name)
+    for family in FAMILIES
+    for name in TRANSFORMATIONS
+    # They carry on their upper side.
+    if not (family == "conveyors" and "turned" in name)
+]
 
 
 @pytest.mark.filterwarnings("ignore:LAW BROKEN")
-@pytest.mark.parametrize("name", TRANSFORMATIONS)
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize(("family", "name"), CASES)
 def test_a_transformed_machine_runs_as_its_law_says(family, name):
     check(family, name, range(FEW[family]))
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:LAW BROKEN")
-@pytest.mark.parametrize("name", TRANSFORMATIONS)
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize(("family", "name"), CASES)
 def test_many_transformed_machines_run_as_their_law_says(family, name):
     check(family, name, range(FEW[family], MANY[family]))
 
@@ -290,4 +299,15 @@ def test_restitution_that_depends_on_more_than_a_law_allows_is_told(name, more, 
     drawn.cache_clear()
     with pytest.raises(AssertionError):
         check("oddities", name, range(24))
+    drawn.cache_clear()
+
+
+@pytest.mark.slow
+def test_a_fault_in_one_draw_of_twenty_is_told(with_fault):
+    """The planted fault: rolling friction, which few draws have, by 1e-6 of the normal's x."""
+    arm = "c->arm = pair->rolling * reach"
+    with_fault("contact.c", f"{arm};", f"{arm} * (1 + 1e-6 * c->nx);")
+    drawn.cache_clear()
+    with pytest.raises(AssertionError, match="assert 2 <="):
+        check("oddities", "mirrored", range(40))
     drawn.cache_clear()

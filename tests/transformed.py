@@ -134,7 +134,7 @@ def _moved(tables, law, direction):
         return law.hand * value
 
     change(found, ["gravity_deg"], turn)
-    for name in ("surface", *JOINTS, "stream"):
+    for name in ("surface", "conveyor", *JOINTS, "stream"):
         for row in found.get(name, []):
             change(row, ["from", "to", "at", "center", "pivot", "over"], place)
             change(row, ["hinge"], lambda at: at if isinstance(at, str) else place(at))
@@ -217,7 +217,7 @@ def reordered(tables, seed):
             if "other" in row:
                 row["other"] = int(place[row["other"]])
     found["stream"] = [found["stream"][n] for n in mixed]
-    for name in ("particle", "surface", *JOINTS):
+    for name in ("particle", "surface", "conveyor", *JOINTS):
         if name in found:
             found[name] = [found[name][n] for n in random.permutation(len(found[name]))]
     for row in found["surface"]:

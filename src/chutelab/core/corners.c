@@ -324,10 +324,11 @@ static const Touch *places_at(int i, int j, double t, double within, int *count)
     return k->places;
 }
 
-/* List the places at which two touch now as contacts: where a gap is closed, or where a contact lasts. */
-RARELY int list_struck(int i, int j, double t, Contact *list) {
+/* Add the places at which two touch now to a list of contacts: where a gap is closed, or where a contact lasts. Return how
+   many there are then. */
+static int add_struck(int i, int j, double t, Contact *list, int count) {
     double least = inner_of(i, j);
-    int lasts = 0, count = 0;
+    int lasts = 0, found = 0;
     for (int link = W.disks[i].links; link >= 0; link = W.links[link]) {
         const Contact *c = W.contacts + link / 2;
         lasts |= c->i == i && c->j == j && c->impulse[0] > 0;
@@ -336,10 +337,20 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
     /* With joints, an impact just after the beginning of a step is resolved at the beginning. */
     if (W.joint_count && t <= W.t) most = fastest_of(i, j, t, span);
     if (most < INFINITY) within = MAX(within, most * span);
-    const Touch *places = places_at(i, j, t, within, &count);
-    for (int n = 0; n < count; n++) {
-        describe_touch(list + n, i, j, places + n);
-        list[n].drift = 0;
+    const Touch *places = places_at(i, j, t, within, &found);
+    for (int n = 0; n < found && count < MOST_TOUCHES; n++) {
+        describe_touch(list + count, i, j, places + n);
+        list[count++].drift = 0;
+    }
+    return count;
+}
+
+/* List these contacts; those with a surface also on the pieces that continue it. */
+RARELY int list_struck(int i, int j, double t, Contact *list) {
+    int count = add_struck(i, j, t, list, 0);
+    for (int n = 0; n < 2 && j < 0; n++) {
+        int mate = mate_of(W.surfaces + (-1 - j), n);
+        if (mate >= 0 && is_near(W.surfaces + mate, W.disks + i)) count = add_struck(i, -1 - mate, t, list, count);
     }
     return count;
 }
@@ -491,7 +502,7 @@ RARELY void strike_corners(int i, int j, double t) {
         for (int k = 1; k < 3; k++) c->entries[k] = by * MAX(c->entries[k], 0);
         book(a->entries, two ? b->entries : 0, c->owner, c->entries);
         if (j < 0) W.drives[c->owner] += driven(c, 0);
-        if (j < 0 && c->impulse[0] > 0) hold(a, -1 - j);
+        if (j < 0 && c->impulse[0] > 0) hold(a, -1 - c->j);
         bear_contact(c, 1, t, t);
         if (c->impulse[0] > main->impulse[0]) main = c;
     }

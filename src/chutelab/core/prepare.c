@@ -136,7 +136,7 @@ static int first_near(int end, double r, double *last) {
 }
 
 /* Set which piece continues smoothly beyond an end: beyond a segment an arc or a circle, beyond an arc also a segment; or
-   -1. */
+   -1. For particles with corners, which may lie on both, also one segment beyond another. */
 static void find_mate(int k, int end, double r) {
     Surface *s = W.surfaces + k;
     double place[2], onward[2], other[2], back[2], last;
@@ -149,7 +149,7 @@ static void find_mate(int k, int end, double r) {
         int m = W.ends[row] / 2;
         const Surface *next = W.surfaces + m;
         if (rank(W.ends[row]) > last) break;
-        if (m == k || m >= mate || (next->shape == SEGMENT && s->shape == SEGMENT)) continue;
+        if (m == k || m >= mate || (next->shape == SEGMENT && s->shape == SEGMENT && !W.outline_count)) continue;
         if (next->mover != s->mover || (next->one_sided != s->one_sided)) continue;
         at_end(next, W.ends[row] % 2, other, back);
         double off = hypot(other[0] - place[0], other[1] - place[1]);

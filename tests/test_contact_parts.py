@@ -510,8 +510,8 @@ def drawn_piece(rng, name, angle):
     return piece | {"center": center.tolist(), "radius": radius, "from_deg": first, "to_deg": last}
 
 
-@pytest.mark.parametrize("engine", ["exact", "contact"])
-def test_round_an_end_a_belt_runs_as_if_no_gate_had_been_there(engine):
+@pytest.mark.parametrize(("engine", "near"), [("exact", 1e-9), ("contact", 1e-9), ("pymunk", 1e-4)])
+def test_round_an_end_a_belt_runs_as_if_no_gate_had_been_there(engine, near):
     """Which way the rim of an end runs, and of what it is, the pieces say that are there."""
     met = 0
     for seed in range(60):
@@ -534,7 +534,7 @@ def test_round_an_end_a_belt_runs_as_if_no_gate_had_been_there(engine):
             # It would begin inside one of them.
             continue
         alone, *others = (one.ends()[1]["position"][0] for one in runs)
-        assert np.allclose(others, alone, atol=1e-9), seed
+        assert np.allclose(others, alone, atol=near), seed
         met += not np.allclose(alone, start + 0.3 * way)
     assert met > 20
 

@@ -159,6 +159,7 @@ class Lone:
             self._look()
             if self.world.gates and not released:
                 every = self.world.faces
+                self.world.set_clock(self.t)
                 there = [face for face in every if face.appears <= self.t < face.vanishes]
                 # A gate that closed on the particle acts once the particle is clear of it.
                 inside = {face for face in there if face.gap(self.x)[0] < -self.world.hair}

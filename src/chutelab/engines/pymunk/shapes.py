@@ -332,12 +332,16 @@ class Shapes:
             jx, jy = n.x * c.jnAcc - n.y * c.jtAcc, n.x * c.jtAcc + n.y * c.jnAcc
             self.points.append((*rows, first, -jx, -jy, n.x, n.y, c.r1.x, c.r1.y, c.r2.x, c.r2.y))
 
-    def open_and_shut(self, now: float) -> None:
-        """Add gates that exist at a time (s), remove others; note particles on which they close."""
-        space = self.world.space
+    def open_and_shut(self, now: float) -> bool:
+        """Add gates that exist at a time (s), remove others; note particles on which they close.
+
+        Return whether there were any.
+        """
+        space, changed = self.world.space, False
         for face, shapes in self.gates.items():
             if (face.appears <= now < face.vanishes) == (face in self.up):
                 continue
+            changed = True
             if face in self.up:
                 self.up.remove(face)
                 space.remove(*shapes)
@@ -348,6 +352,7 @@ class Shapes:
         for face in {face for _, face in self.shut}:
             inside = self._in(self.gates[face]) if face in self.up else set()
             self.shut -= {(s, f) for s, f in self.shut if f is face and s not in inside}
+        return changed
 
     def _in(self, shapes: list[pymunk.Shape]) -> set[pymunk.Shape]:
         """Return the particles that overlap shapes of a surface."""

@@ -125,8 +125,7 @@ class Shared:
         about += [(face.surface, face.speed, *(face.tangent or (0.0, 0.0))) for face in faces]
         surface, self.speed, self.tx, self.ty = np.array(about).T
         self.surface = surface.astype(np.int64)
-        # Directions of all rows at the first end and at the last, x and y.
-        self.crowns = np.array([no_rims()] * count + [face.crowns for face in faces])
+        self._find_crowns()
         self.throws = (self.speed != 0.0) & (self.surface != machine.landing)
         self.spin = np.zeros(rows)
         self.spin[count:] = [face.spin for face in faces]
@@ -150,6 +149,12 @@ class Shared:
         self.row = ids.argsort()
         self.ids = ids[self.row]
 
+    def _find_crowns(self) -> None:
+        """Set the directions of all rows at the first end and at the last, x and y, as of now."""
+        self.world.set_clock(self.t + SOON * self.h)
+        crowns = [face.crowns for face in self.world.faces]
+        self.crowns = np.array([no_rims()] * self.count + crowns)
+
     def run(self, report: Progress) -> None:
         """Run to the end."""
         reason, enough = "time", None
@@ -162,8 +167,8 @@ class Shared:
                 clock = min(int((due - self.begin) / self.h), self.most - 1)
                 self.clock = max(self.clock, clock)
                 self.t = self.begin + self.clock * self.h
-            if self.shapes.gates:
-                self.shapes.open_and_shut(self.t + SOON * self.h)
+            if self.shapes.gates and self.shapes.open_and_shut(self.t + SOON * self.h):
+                self._find_crowns()
             self._release()
             self._step()
             try:

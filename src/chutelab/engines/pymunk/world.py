@@ -67,17 +67,19 @@ class Onward(NamedTuple):
     end: list[float]
     way: list[float]  # direction
     bend: float  # curvature, 1/m, positive to the left
+    piece: int  # its number: lines, then arcs
 
 
 class Ends:
     """The ends of all straight and bent pieces, and what continues from them.
 
     Straight pieces are given by both ends (m) and their direction. Ends less than `hair` (m) apart
-    are at one place.
+    are at one place. Of the pieces in `faces` only those count that exist at the time `now` (s).
     """
 
     def __init__(self, lines: Sequence[Sequence[Any]], arcs: Arcs, hair: float) -> None:
         self.lines, self.arcs, self.hair = lines, arcs, hair
+        self.faces, self.now = dict[int, Face](), 0.0
 
     def rims(self, start: list[float], end: list[float], along: Vec2d) -> tuple[Vec2d, Vec2d]:
         """Return the crowns at both ends of a straight piece."""
@@ -91,13 +93,14 @@ class Ends:
     def _onward(self) -> tuple[list[float], list[Onward]]:
         """The ends of all pieces by x (m), and what continues from them."""
         found = list[Onward]()
-        for start, end, (x, y) in self.lines:
-            found += Onward(start, [x, y], 0.0), Onward(end, [-x, -y], 0.0)
+        for n, (start, end, (x, y)) in enumerate(self.lines):
+            found += Onward(start, [x, y], 0.0, n), Onward(end, [-x, -y], 0.0, n)
         if self.arcs.surface.size:
             arcs = self.arcs.of(~self.arcs.whole)
+            pieces = (len(self.lines) + np.flatnonzero(~self.arcs.whole)).tolist()
             for ends, ways, turn in zip(arcs.ends, arcs.inward, (1.0, -1.0), strict=True):
                 bends = (turn / arcs.radius).tolist()
-                found += map(Onward, ends.tolist(), ways.tolist(), bends)
+                found += map(Onward, ends.tolist(), ways.tolist(), bends, pieces)
         found.sort(key=lambda one: one.end[0])
         return [one.end[0] for one in found], found
 
@@ -105,7 +108,12 @@ class Ends:
         """Return the pieces that end at a place (m)."""
         (places, found), x, hair = self._onward, end[0], self.hair
         low, high = bisect_left(places, x - hair), bisect_left(places, x + 1.01 * hair)
-        return [one for one in found[low:high] if dist(one.end, end) <= hair]
+        near = (one for one in found[low:high] if dist(one.end, end) <= hair)
+        return [one for one in near if self._is_there(one.piece)]
+
+    def _is_there(self, piece: int) -> bool:
+        face = self.faces.get(piece)
+        return face is None or face.appears <= self.now < face.vanishes
 
     def crown(self, end: Sequence[float], out: Vec2d, bend: float = 0.0) -> Vec2d:
         """Return the direction to the middle of the rim that continues a left side.
@@ -166,7 +174,8 @@ class World:
             rims = partial(left_twice, tangent)
             if about["speed"]:
                 rims = partial(self.ends.rims, start, end, tangent)
-            self._add(Face(shape, tangent=tangent, rims=rims, **about))
+            self.ends.faces[n] = Face(shape, tangent=tangent, rims=rims, **about)
+            self._add(self.ends.faces[n])
         if wheel is not None:
             turning = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
             turning.angular_velocity = -wheel.speed / wheel.radius
@@ -179,6 +188,12 @@ class World:
                 self._bend(n, Vec2d(*center), ends, self._about(arcs, n))
         self.faces = list(self.by_shape.values())
         self.gates = any(face.appears > -inf or face.vanishes < inf for face in self.faces)
+
+    def set_clock(self, now: float) -> None:
+        """Let the crowns of all faces be those among the pieces that exist at a time (s)."""
+        self.ends.now = now
+        for face in self.faces:
+            vars(face).pop("crowns", None)
 
     def _about(self, parts: Segments | Arcs, n: int) -> dict[str, Any]:
         """Return the values of a face for a segment or arc; pair values are (S,), or (K, S)."""
@@ -222,10 +237,12 @@ class World:
             else 0.0
             for end, inward in ends
         )
-        self._add(Bend(
+        face = Bend(
             circle, tangent=None, foot=foot, begin=begin - before, extent=extent + before + after,
             rims=no_rims, **about,
-        ))  # fmt: skip
+        )  # fmt: skip
+        self.ends.faces[len(self.ends.lines) + n] = face
+        self._add(face)
         # The outward direction is along the surface at the first end, against it at the last.
         for (place, inward), way in zip(ends, (1.0, -1.0), strict=True):
             end = place.tolist()

@@ -199,7 +199,6 @@ def test_potential_energy_of_different_masses_can_be_stacked():
     machine = machine_of(FLOOR, at=spots)
     machine = replace(machine, particle=replace(machine.particle, mass=np.array([0.2, 0.7])))
     books = energies(recording_of(machine, *map(still, spots)), np.array([0.0, 1.0]))
-    # Above where one lies on the floor, with a radius of 4 mm.
-    lifted = 9.81 * (0.2 * (0.5 - 0.004) + 0.7 * (0.3 - 0.004))
-    assert books["potential"] == pytest.approx(lifted)
-    assert books["start"] == pytest.approx(lifted)
+    # Above 0.3 m, the lowest place.
+    assert books["potential"] == pytest.approx(0.2 * 9.81 * 0.2)
+    assert books["start"] == pytest.approx(0.2 * 9.81 * 0.2)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.core import number as layout_number
-from chutelab.machine import Machine
 from chutelab.machine.parts import Mover
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.arrival import arrivals
@@ -171,8 +170,8 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     """Return the ledger at times (T,), J, with positive potential energy, for stacking.
 
     It is `Recording.energy_at` with ``start``, kinetic and potential energy at the release of all
-    particles released so far. Heights count from the `ground`, as in a page; where something falls
-    below that, from the lowest point that a particle comes to.
+    particles released so far. Potential energy is relative to the lowest point of the particles
+    that stay in the scene (of all, if it were negative otherwise).
     """
     balance = recording.energy_at(times)
     first, _ = recording.ends()
@@ -184,11 +183,14 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     masses = recording.mass[indices][order]
     weight = np.concatenate([[0.0], np.cumsum(masses)])[released] * recording.gravity
     heights = recording.machine.height(recording.knots["position"])
-    zero, lowest = ground(recording.machine), float(heights.min(initial=np.inf))
-    # A particle that lies is a hair in what it lies on.
-    if lowest < zero - SUNK * float(np.max(recording.machine.particle.radius)):
-        zero = lowest
-    balance["potential"] = np.maximum(balance["potential"] - weight * zero, 0.0)
+    stays = recording.ended != REASONS.index("exit")
+    staying = heights[np.repeat(stays, np.diff(recording.offsets))]
+    lowest = float(heights.min(initial=np.inf))
+    for zero in (float(staying.min()) if len(staying) else lowest, lowest):
+        lifted = balance["potential"] - weight * zero
+        if (lifted >= 0.0).all():
+            break
+    balance["potential"] = np.maximum(lifted, 0.0)
     balance["start"] = at_release[released] - weight * zero
     hung = [one for one in recording.machine.movers if one.hinge]
     if hung and "hinges" not in paid_by(recording):
@@ -196,26 +198,6 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
         for one in hung:
             _hang(balance, one, recording, times)
     return balance
-
-
-SUNK = 0.05
-"""Share of a radius by which a particle may be inside a surface; deeper breaks a law of the run."""
-
-
-def ground(machine: Machine) -> float:
-    """Return the height, m, at which the smallest particle lies at the lowest place of a machine.
-
-    Where particles are released below that, or there are no surfaces, it is their lowest place.
-    Boxes count without a radius, and so do ends on sides to which gravity does not pull.
-    """
-    releases, margin = machine.releases, layout_number("EXIT_MARGIN")
-    box, cornered = releases.exit_box, any(one is not None for one in machine.outlines)
-    height = np.full(len(box), 0.0 if cornered else float(np.min(machine.particle.radius)))
-    for axis, share in enumerate(machine.up):
-        end = box[:, axis] + margin if share > 0.0 else box[:, axis + 2] - margin
-        height += share * np.where(np.isfinite(end), end, 0.0)
-    height[~np.isfinite(box).any(axis=1)] = np.inf
-    return float(min(height.min(), machine.height(releases.position).min()))
 
 
 def _hang(balance: dict[str, Floats], mover: Mover, recording: Recording, times: Floats) -> None:

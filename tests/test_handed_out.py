@@ -42,6 +42,7 @@ TOLD = {
     8: {"0.05", "0.1", "0.2", "0.200", "9.7", "4.9", "13"},  # steps, ms, and their errors
     9: {"60", "14"},  # the end of the range that is searched, and an equation
     11: {"0.8"},  # a rolling friction to try
+    12: {"0.3"},  # how far below the axis the formulas are compared, m
     13: {"0.01"},  # a damper, N m s
 }
 """What answers share with questions, by lesson, since the question gives it."""

@@ -224,7 +224,7 @@ def check(family, name, seeds):
         rounding, step = SENSITIVE if name not in ("doubled", "hastened") else (1.0, 0.0)
         if differs > rounding * it.growth * ROUNDING + step * it.step:
             off[seed] = differs, it.growth, it.step
-    assert len(off) <= count // FEW_OFF, off
+    assert len(off) <= round(count / FEW_OFF), off
 
 
 FEW = {"oddities": 8, "conveyors": 4, "bodies": 3, "hinges": 2, "bowls": 1, "chains": 7,

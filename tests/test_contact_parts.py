@@ -16,6 +16,8 @@ from chutelab.scene import SceneError
 from cores import Core
 from crowds import hollow
 from machines import bent, face, gated, of_sizes, scene_of, thrown
+from sandbox import bodies
+from shared import seeds
 
 G = 9.81
 FAR = face("far", (-50.0, -90.0), (50.0, -90.0))
@@ -537,6 +539,26 @@ def test_round_an_end_a_belt_runs_as_if_no_gate_had_been_there(engine, near):
         assert np.allclose(others, alone, atol=near), seed
         met += not np.allclose(alone, start + 0.3 * way)
     assert met > 20
+
+
+@pytest.mark.parametrize("seed", seeds(3, 100))
+def test_a_gate_that_never_appears_changes_no_bit(seed):
+    """Bodies in a machine whose lines go on in gates, but only after the end of the run."""
+    tables = bodies(seed, both=False)
+    rng, end, gates = np.random.default_rng([4, seed]), tables["run"]["until"], []
+    moves = {"turn", "shake", "travel", "hinge"}
+    for line in (one for one in tables["surface"] if "from" in one and not moves & one.keys()):
+        for first, last in ((line["from"], line["to"]), (line["to"], line["from"])):
+            way = np.subtract(last, first)
+            piece = drawn_piece(rng, f"gate {len(gates)}", float(np.arctan2(*way[::-1])))
+            for key in piece.keys() & {"from", "to", "center"}:
+                piece[key] = np.add(piece[key], last).tolist()
+            gates.append(piece | {"closes_at": end + 1.0})
+    alone, beside = (
+        chutelab.simulate(tables | {"surface": surfaces}, engine="contact").knots
+        for surfaces in (tables["surface"], tables["surface"] + gates)
+    )
+    assert alone.tobytes() == beside.tobytes()
 
 
 def test_a_particle_waits_until_a_gate_in_its_place_opens():

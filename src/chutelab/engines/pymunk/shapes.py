@@ -335,7 +335,7 @@ class Shapes:
     def open_and_shut(self, now: float) -> bool:
         """Add gates that exist at a time (s), remove others; note particles on which they close.
 
-        Return whether there were any.
+        Return whether a gate was added or removed.
         """
         space, changed = self.world.space, False
         for face, shapes in self.gates.items():

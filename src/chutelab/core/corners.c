@@ -345,12 +345,19 @@ static int add_struck(int i, int j, double t, Contact *list, int count) {
     return count;
 }
 
-/* List these contacts; those with a surface also on the pieces that continue it. */
+/* List these contacts; those with a surface on all pieces that continue each other, as far as the particle reaches. */
 RARELY int list_struck(int i, int j, double t, Contact *list) {
-    int count = add_struck(i, j, t, list, 0);
-    for (int n = 0; n < 2 && j < 0; n++) {
-        int mate = mate_of(W.surfaces + (-1 - j), n);
-        if (mate >= 0 && is_near(W.surfaces + mate, W.disks + i)) count = add_struck(i, -1 - mate, t, list, count);
+    int count = add_struck(i, j, t, list, 0), struck = -1 - j, is_closed = j >= 0;
+    for (int n = 0; n < 2 && !is_closed; n++) {
+        int end = n, last = struck, k = -1;
+        while (end >= 0 && (k = mate_of(W.surfaces + last, end)) >= 0 && k != struck) {
+            const Surface *s = W.surfaces + k;
+            if (!is_near(s, W.disks + i)) break;
+            count = add_struck(i, -1 - k, t, list, count);
+            end = mate_of(s, 0) == last ? 1 : mate_of(s, 1) == last ? 0 : -1;
+            last = k;
+        }
+        is_closed = k == struck;
     }
     return count;
 }

@@ -755,6 +755,34 @@ def test_the_dashed_example_goes_at_the_first_stroke_and_comes_back_if_nothing_i
     assert len(given(page)["surface"]) == 1
 
 
+# Shown elements with text that share a pixel with the line that says which point is next.
+COVERED = """() => {
+  const box = document.querySelector(".chip").getBoundingClientRect();
+  return [...document.querySelectorAll(".hello, .examples, .parts, .transport, header > *")]
+    .filter((one) => one.checkVisibility({ visibilityProperty: true }))
+    .filter((one) => {
+      const its = one.getBoundingClientRect();
+      return its.left < box.right && box.left < its.right
+        && its.top < box.bottom && box.top < its.bottom;
+    }).map((one) => one.className);
+}"""
+
+
+@pytest.mark.parametrize("width", [1366, pytest.param(1920, marks=pytest.mark.slow)])
+def test_nothing_lies_under_what_says_which_point_is_next(empty, width):
+    page = empty("de", viewport={"width": width, "height": 768})
+    for part in ("line", "arc", "belt"):
+        page.click(f"#part-{part}")
+        expect(page.locator(".chip")).to_be_visible()
+        assert page.evaluate(COVERED) == []
+        page.keyboard.press("Escape")
+    expect(page.locator(".examples")).to_be_visible()
+    page.click("#begin")
+    page.click("#tool-add")
+    page.click("#part-arc")
+    assert page.evaluate(COVERED) == []
+
+
 @pytest.mark.slow
 def test_the_first_machine_and_the_examples_are_one_click_away(empty):
     page = empty("de")

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from chutelab import scene as sc
-from chutelab.checks.agreement import MOST_ALONE, verify
+from chutelab.checks.agreement import ENGINES, MOST_ALONE, verify
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
 from chutelab.results.quantities import measure, measured
 from chutelab.results.summary import summary
 from chutelab.scene.quantities import FIRST, REGISTRY, STATISTICS, THEORY, lookup, whose
 from chutelab.scene.units import read_size, write_size
+from chutelab.studies.accuracy import LateError, answer
 from chutelab.studies.sweep.plan import Block, runs
 from machines import PERPENDICULAR
 
@@ -287,12 +288,32 @@ def test_each_shipped_scene_says_what_it_shows_and_by_what_source(name):
     assert all(len(expect.source) > 5 for expect in scene.expect)
 
 
-@pytest.mark.slow  # `chutelab verify` is a stage of CI of its own
-@pytest.mark.parametrize("name", sc.shipped())
-def test_each_shipped_scene_shows_what_it_is_expected_to(name):
+SECONDS_IN_PYMUNK = (
+    *("bucket-elevator", "coal-transfer", "cradle", "damper-plate", "domino-gate", "dominoes"),
+    *("drum", "flap-gate", "heap", "hopper", "loop", "rock-box", "silo", "slip", "stream"),
+    "vibrating-feeder",
+)
+"""Scenes that take Pymunk 1.5 s or more: with it they are verified in the slow tests."""
+
+
+@pytest.mark.parametrize(
+    ("name", "engines"),
+    [
+        *((name, 2 if name in SECONDS_IN_PYMUNK else 3) for name in sc.shipped()),
+        *(pytest.param(name, 3, marks=pytest.mark.slow) for name in SECONDS_IN_PYMUNK),
+    ],
+)
+def test_each_shipped_scene_shows_what_it_is_expected_to(name, engines, monkeypatch):
+    def some(scene, engine, **options):
+        if engine not in ("dop853", *ENGINES[:engines]):
+            raise LateError("it takes seconds")
+        return answer(scene, engine, **options)
+
+    monkeypatch.setattr("chutelab.checks.agreement.answer", some)
     found = verify(sc.load(name))
     broken = [row for row in (*found.findings, *found.agreements) if not row.holds]
     assert broken == []
+    assert {"exact", "contact"} & {row.engine for row in found.findings}
 
 
 def test_a_quantity_may_be_of_one_stream():

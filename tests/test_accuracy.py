@@ -86,13 +86,15 @@ def test_exact_is_held_against_theory_or_scipy(name):
     assert not found.chaotic
 
 
-@pytest.mark.parametrize("engine", ["pymunk", "contact"])
 @pytest.mark.parametrize(
-    "name",
+    ("name", "engine"),
     [
         # A belt that brakes, a slip round the pulley, and blows alone.
-        name if name in ("belt-landing", "slip", "inclined-40")
-        else pytest.param(name, marks=pytest.mark.slow)
+        pytest.param(name, engine, marks=() if name in quick else pytest.mark.slow)
+        for engine, quick in (
+            ("contact", ("belt-landing", "slip", "inclined-40")),
+            ("pymunk", ("slip", "inclined-40")),
+        )
         for name in LONE
     ],
 )  # fmt: skip

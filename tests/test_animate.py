@@ -985,27 +985,26 @@ def test_hinges_whose_energy_is_known_of_whole_runs_only_are_told_as_what_gives_
     assert name != "see-saw" or paid_by(simulate(name, engine="pymunk")) == ("hinges",)
 
 
-def test_what_pushes_do_beside_belts_and_a_plate_turned_by_hand_has_their_name():
-    def words(*, turned, pushed):
-        run = chutelab.start("perpendicular")
-        run.step(0.3)
-        if turned:
-            run.set("plate.angle_deg", 5.0)
-        if pushed:
-            run.push(0, (0.01, 0.0))
-        run.step(0.2)
-        made = run.recording
-        stage = stage_of(made, moments_at((0.1, 0.4)))
-        figure = chutelab.overlay(made)
-        (line,) = figure.findobj(lambda one: one.get_gid() == "supplied")
-        return {one.get_text() for one in stage.figure.findobj(Text)}, " ".join(
-            line.get_label().split()
-        )
-
-    for turned, pushed, paid in (
-        (False, False, "belt work"), (False, True, "belt work, pushes"),
-        (True, False, "drives, hinges"), (True, True, "drives, hinges, pushes"),
-    ):  # fmt: skip
-        said, told = words(turned=turned, pushed=pushed)
-        assert paid in said
-        assert told == f"at release + {paid}"
+@pytest.mark.parametrize(
+    ("turned", "pushed", "paid"),
+    [
+        (False, True, "belt work, pushes"), (True, True, "drives, hinges, pushes"),
+        pytest.param(False, False, "belt work", marks=pytest.mark.slow),
+        pytest.param(True, False, "drives, hinges", marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_what_pushes_do_beside_belts_and_a_plate_turned_by_hand_has_their_name(
+    turned, pushed, paid
+):
+    run = chutelab.start("perpendicular")
+    run.step(0.3)
+    if turned:
+        run.set("plate.angle_deg", 5.0)
+    if pushed:
+        run.push(0, (0.01, 0.0))
+    run.step(0.2)
+    made = run.recording
+    stage = stage_of(made, moments_at((0.1, 0.4)))
+    assert paid in {one.get_text() for one in stage.figure.findobj(Text)}
+    (line,) = chutelab.overlay(made).findobj(lambda one: one.get_gid() == "supplied")
+    assert " ".join(line.get_label().split()) == f"at release + {paid}"

@@ -177,7 +177,7 @@ def test_a_push_is_force_times_time_although_impacts_cut_the_steps_of_joints():
     closes(run.recording)
 
 
-@pytest.mark.parametrize("seed", seeds(15, 300))
+@pytest.mark.parametrize("seed", seeds(9, 300))
 def test_what_is_done_to_random_machines_by_hand_keeps_all_laws(seed):
     """Crowds with belts and gates, or bodies with joints on what moves: pushed and set."""
     random = np.random.default_rng(seed)

@@ -349,6 +349,11 @@ CROWDS = {
     "dominoes": ("dominoes", "run.until=0.25"),
     "drum": (DRUM,),
 }
+FEW_CROWDS = [
+    pytest.param(name, marks=pytest.mark.slow if name in ("hopper", "stream") else ())
+    for name in CROWDS
+]
+"""What runs down in the hopper also does in the Galton board, and on the belt in `rides`."""
 
 
 def crowded(name, **left_out):
@@ -360,7 +365,7 @@ def crowded(name, **left_out):
     return core.run()
 
 
-@pytest.mark.parametrize("name", CROWDS)
+@pytest.mark.parametrize("name", FEW_CROWDS)
 def test_a_track_is_off_by_less_than_a_hop_and_the_run_stays_as_it_is(name):
     """Beside the same run with a knot before and after each blow, and at each step in contact.
 
@@ -395,7 +400,7 @@ def test_what_a_step_of_no_length_releases_leaves_nothing_over_then(name):
     assert abs(now["residual"][0]) <= 1e-12 * (1e-3 + abs(now["potential"][0]))
 
 
-@pytest.mark.parametrize("name", CROWDS)
+@pytest.mark.parametrize("name", FEW_CROWDS)
 def test_the_energy_of_a_crowd_is_that_of_its_steps_and_closes_at_any_time(name):
     """K + U of all, less that at their releases, less what they got, is 0 at each step."""
     run = crowded(name)

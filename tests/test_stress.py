@@ -288,7 +288,7 @@ def test_what_is_ignored_or_of_another_program_is_left_alone():
     [
         "spoon", "two-sizes --engine pymunk", "inclined-conveyor --engine contact",
         "hopper --set stream.count=50 --set run.max_time=0.6",
-        "dominoes --set run.until=0.5", "see-saw", "loop", "cradle",
+        "dominoes --set run.until=0.25", "see-saw", "loop", "cradle",
         *(
             pytest.param(words, marks=pytest.mark.slow)
             for words in (

@@ -227,8 +227,8 @@ def check(family, name, seeds):
     assert len(off) <= round(count / FEW_OFF), off
 
 
-FEW = {"oddities": 8, "conveyors": 4, "bodies": 3, "hinges": 2, "bowls": 1, "chains": 7,
-       "chains, exact": 7}  # fmt: skip
+FEW = {"oddities": 5, "conveyors": 3, "bodies": 2, "hinges": 1, "bowls": 1, "chains": 4,
+       "chains, exact": 4}  # fmt: skip
 MANY = {"oddities": 100, "conveyors": 60, "bodies": 40, "hinges": 24, "bowls": 8, "chains": 80,
         "chains, exact": 80}  # fmt: skip
 CASES = [

@@ -193,12 +193,10 @@ def first_passages(recording: Record, name: str) -> dict[str, Floats]:
     particles, rows = np.unique(found["particle"], return_index=True)
     some = found[rows]
     told = np.full((6, recording.count), nan)
-    told[:, particles] = [
-        some["t"],
-        *some["position"].T,
-        *some["velocity"].T,
-        np.hypot(*some["velocity"].T),
-    ]
+    told[0, particles] = some["t"]
+    told[1:3, particles] = some["position"].T
+    told[3:5, particles] = some["velocity"].T
+    told[5, particles] = np.hypot(*told[3:5, particles])
     return dict(zip(("t", "x", "y", "vx", "vy", "speed"), told, strict=True))
 
 

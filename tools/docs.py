@@ -147,7 +147,7 @@ def readme(pages: Path) -> None:
 
 
 def gallery(pages: Path, extra: Path, filmed: list[str]) -> None:
-    """Make the gallery: films of all scenes or of some, and their live pages if there can be one."""
+    """Make the gallery: films of all scenes or of some, and the live pages that there can be."""
     text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
     (extra / "live").mkdir(parents=True)
     (extra / "films").mkdir()

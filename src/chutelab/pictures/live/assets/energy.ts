@@ -19,8 +19,9 @@ const KEPT: Record<string, string[]> = { spring: ["spring", "stiffness"], damper
 /** A residual below this part of the whole is rounding, and not shown. */
 const TINY_RESIDUAL = 1e-12;
 
-/** A work below this part of the whole, in a machine without drives, is not shown. */
-const TINY_WORK = 1e-9;
+/** A work below this part of the whole, in a machine without drives, is not shown: what holds a hinge
+ * does that much. */
+const TINY_WORK = 1e-7;
 
 /** J; less is shown as 0. */
 const UNSEEN = 5e-13;
@@ -107,7 +108,7 @@ class EnergyPanel {
     this.closes.replaceChildren(icon("tick"),
       this.words.say("energy-closes", { energy: this.words.energy(size) }));
     SIGNS.forEach(([name], n) => {
-      this.cells.get(name).textContent = this.words.energy(ledger[name]);
+      this.cells.get(name).textContent = this.words.energy(ledger[name], size);
       this.rows[n].hidden = (name === "residual" && isClosed)
         || (name === "belt_work" && !this.paid && Math.abs(ledger[name]) < TINY_WORK * size)
         || (name === "push_work" && !recording.pushes.length && !ledger.push_work)

@@ -105,11 +105,12 @@ class Words {
     return this.local((Math.abs(value) < 0.5 * 10 ** -places ? 0 : value).toFixed(places));
   }
 
-  /** Returns an energy in mJ or J. @param value J */
-  energy(value: number) {
-    const size = Math.abs(value);
+  /** Returns an energy in mJ or J, a small part of the whole with two digits.
+   * @param value J @param whole J */
+  energy(value: number, whole: number = 0) {
+    const size = Math.abs(value), digits = size < 1e-4 * whole ? 2 : 4;
     if (size < 5e-13) return "0 mJ";
-    return size < 1 ? `${this.number(1e3 * value)} mJ` : `${this.number(value)} J`;
+    return size < 1 ? `${this.number(1e3 * value, digits)} mJ` : `${this.number(value, digits)} J`;
   }
 
   local(text: string) {

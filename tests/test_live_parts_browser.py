@@ -777,8 +777,12 @@ def test_nothing_lies_under_what_says_which_point_is_next(empty, width):
         assert page.evaluate(COVERED) == []
         page.keyboard.press("Escape")
     expect(page.locator(".examples")).to_be_visible()
+    # The parts of a machine that is there cover neither it nor what plays it.
     page.click("#begin")
     page.click("#tool-add")
+    parts = page.locator("#parts").bounding_box()
+    assert page.locator(".transport").bounding_box()["x"] > parts["x"] + parts["width"]
+    assert page.evaluate("chutelab.stage.view.free.left") > parts["x"] + parts["width"]
     page.click("#part-arc")
     assert page.evaluate(COVERED) == []
 

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from chutelab.scene import load
-from live.browser import DONE
+from live.browser import DONE, spot
 from shared import some
 
 playwright = pytest.importorskip(
@@ -767,3 +767,17 @@ def test_the_bar_of_the_scale_is_in_no_drum(shown):
     assert found["west"] >= 0.0
     long = float(found["said"].removesuffix(" m")) * page.evaluate("chutelab.stage.view.scale")
     assert found["east"] - found["west"] == pytest.approx(long, abs=4.0)
+
+
+@pytest.mark.slow
+def test_the_picture_has_a_frame_when_keys_come_to_it_and_none_when_it_is_clicked(shown):
+    page = shown("perpendicular")
+    frame = "getComputedStyle(document.querySelector('#picture')).outlineStyle"
+    focused = "document.activeElement.id"
+    x, y = spot(page, 0.5, 0.5)
+    page.mouse.click(x, y)
+    assert (page.evaluate(focused), page.evaluate(frame)) == ("picture", "none")
+    page.evaluate("document.activeElement.blur()")
+    while page.evaluate(focused) != "picture":
+        page.keyboard.press("Tab")
+    assert page.evaluate(frame) == "solid"

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 from chutelab import scene, theory
@@ -17,6 +18,7 @@ from chutelab.machine import build
 from chutelab.pictures import animation, plots
 from chutelab.pictures.animation import animate
 from chutelab.pictures.plots import Window, style
+from chutelab.pictures.plots.scenery import energies
 from chutelab.results import Kind
 from chutelab.results.ledger import ledger
 from chutelab.util.errors import InputError
@@ -396,3 +398,18 @@ def test_a_picture_shows_itself_in_a_notebook(tmp_path):
         width, height = figure.get_size_inches()
         assert screen.size == (round(80 * width), round(80 * height))
         assert written.width > screen.width
+
+
+def test_where_a_potential_energy_is_read_its_zero_is_told():
+    """The picture has m g (y - y_min), the table m g y."""
+    run = simulate(scene.load("perpendicular"))
+    t, y = run.knots["t"], run.knots["position"][:, 1]
+    weight = run.particle.mass * run.gravity
+    stacked = energies(run, t)["potential"]
+    # Twice a knot has the same time: before an impact and after.
+    assert stacked == pytest.approx(weight * (y - y.min()), abs=1e-12)
+    legend = [text.get_text() for text in plots.overlay(run).findobj(Text)]
+    assert "potential, from the\nlowest place reached" in legend
+    said = " ".join(str(run.ledger).split())
+    told = re.search(r"potential (\S+) -> (\S+) J; heights from the origin", said)
+    assert [float(told[n]) for n in (1, 2)] == pytest.approx(weight * y[[0, -1]], rel=1e-5)

@@ -150,7 +150,7 @@ class Ledger(Shown):
             ("", *heads),
             tuple(map(tuple, rows)),
             foot=(tuple(total),),
-            notes=(", ".join(moved), left),
+            notes=(f"{', '.join(moved)}; heights from the origin", left),
         )
 
 

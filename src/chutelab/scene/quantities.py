@@ -249,8 +249,10 @@ REGISTRY: Final = {
         _run("ledger.turned_over", "energy turned over, to which the residual is relative"),
         _run("ledger.kinetic.start", "kinetic energy at the releases"),
         _run("ledger.kinetic.end", "kinetic energy at the ends of the tracks"),
-        _run("ledger.potential.start", "potential energy at the releases"),
-        _run("ledger.potential.end", "potential energy at the ends of the tracks"),
+        _run("ledger.potential.start",
+             "potential energy at the releases; heights are from the origin"),
+        _run("ledger.potential.end",
+             "potential energy at the ends of the tracks; heights are from the origin"),
         _run(PAID, "work of the outgoing belt's drive", needs="outgoing", columns=ITSELF),
         _run(HEAT, "heat of the slip on the outgoing belt", needs="outgoing", columns=ITSELF),
         _run("ledger.power", "the outgoing belt's work per particle, times the rate over the"

@@ -301,7 +301,7 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
         times,
         [factor * balance[name] for name in names],
         colors=[style.ENERGY[name] for name in names],
-        labels=[say(f"ledger-{name}") for name in names],
+        labels=[say(f"ledger-{'heights' if name == 'potential' else name}") for name in names],
         linewidth=0.0,
     )
     (line,) = ax.plot(times, factor * supplied, color=style.INK, lw=1.6, gid="supplied")

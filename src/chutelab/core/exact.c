@@ -407,7 +407,7 @@ static void rest_on(int obstacle, int side, double rebound) {
     last_bounces(obstacle, side, rebound);
     A.way = obstacle < O.faces ? ON_FACE : ON_ARC;
     A.on = obstacle, A.side = side;
-    A.left = NONE, A.left_side = 0, A.order = 0;
+    A.left = NONE, A.left_side = 0, A.order = 0, A.joint = NONE;
     if (A.way == ON_ARC) look_round();
     settle();
 }
@@ -629,7 +629,7 @@ static void count_idle(double dt) {
 }
 
 static Motion motion_of(double ax, double ay) {
-    return (Motion){ A.x, A.y, A.vx, A.vy, ax, ay, A.left, A.left_side, A.order, NONE, NONE, 0, 0 };
+    return (Motion){ A.x, A.y, A.vx, A.vy, ax, ay };
 }
 
 /* Move the particle for a time dt. */
@@ -640,10 +640,10 @@ static void move(const Motion *m, double dt) {
     A.vx = m->vx + dt * m->ax, A.vy = m->vy + dt * m->ay;
 }
 
-/* Time until a gap closes, 0 if it is closed; infinite if that was in the past or never happens. */
+/* Time until a gap closes, 0 if it is closed; infinite if that never happens. */
 static double when(double gap, double rate, double acceleration) {
     double time = descent(MAX(gap, 0.0), rate, acceleration);
-    return time >= 0.0 ? time : INFINITY;
+    return isnan(time) ? INFINITY : time;
 }
 
 static void stop_now(void) {
@@ -660,7 +660,6 @@ static void drop(void) {
 static void fly(void) {
     const double *box = A.given->exit_box, *up = A.given->up;
     Motion m = motion_of(0.0, -A.given->gravity);
-    m.joint = A.joint;
     double leaves = INFINITY;
     for (int n = 0; n < 2; n++) {
         double right = n ? -up[0] : up[1], above = up[n], pull = above * m.ay;
@@ -742,7 +741,6 @@ static void carry(void) {
         return;
     }
     Motion m = motion_of(0.0, 0.0);
-    m.carried = 1;
     double pace = A.vx * across + A.vy * up, ends = -(A.x * across + A.y * up) / pace;
     double stops = A.given->stop - A.age, height = A.y;
     if (!(pace > 0.0)) ends = INFINITY;
@@ -843,7 +841,6 @@ static void slide(void) {
     double force, couple, pull = face_force(&c, &force, &couple), mass = A.given->mass;
     int rolls = A.turns && A.given->rolling > 0.0;
     Motion m = motion_of(pull * c.tx, pull * c.ty);
-    m.on = A.on, m.on_side = A.side;
     /* As long as there is slip, it is linear in time. */
     double slip = along(&c) + A.z - c.belt, twist = A.lever * (force + couple);
     double rate = (m.ax * c.tx + m.ay * c.ty) + twist, spin = A.z;

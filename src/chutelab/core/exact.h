@@ -126,16 +126,8 @@ extern Obstacles O;
 /* How a particle moves. From ON_FACE on it is in contact. */
 enum Way { OVER, FLIES, RIDES_BELT, ON_FACE, ON_ARC };
 
-/* A motion with constant acceleration until the next event. */
-typedef struct {
-    double x, y, vx, vy, ax, ay;
-    int left, left_side;    /* obstacle (and its face) in contact now that is being left, or -1 ... */
-    int order;              /* ... and how many of the leading coefficients of the gap to it are zero: 1 after a
-                               rebound, 2 when leaving tangentially, 3 when lifting off a circle */
-    int joint;              /* set that it leaves as a whole, tangentially, or -1 */
-    int on, on_side;        /* face it slides on, or -1 */
-    int carried;            /* it rides the incoming belt */
-} Motion;
+/* A motion of the present particle with constant acceleration until the next event. */
+typedef struct { double x, y, vx, vy, ax, ay; } Motion;
 
 /* The present particle. Ages count from its release. */
 typedef struct {
@@ -144,10 +136,13 @@ typedef struct {
     double entries[3];      /* J */
     double share, lever;    /* effective mass at the rim over m; m r2/I, or 0 */
     int turns, way;
-    int on, side;           /* what it touches, and its face; for a circle see `rim_side` */
+    int on, side;           /* what it slides or rides on, or -1, and its face; for a circle see `rim_side` */
     double slip;            /* sign of the slip there, 0 without; 1 in flight */
     double roll;            /* sign of the spin that rolling friction opposes, 0 while it is held */
-    int left, left_side, order, joint; /* see `Motion` */
+    int left, left_side;    /* obstacle (and its face) in contact now that is being left, or -1 ... */
+    int order;              /* ... and how many of the leading coefficients of the gap to it are zero: 1 after a
+                               rebound, 2 when leaving tangentially, 3 when lifting off a circle */
+    int joint;              /* set that it leaves as a whole, tangentially, or -1 */
     int idle, crawls;       /* consecutive events that took no time; that were slow, between two obstacles */
     double angle;           /* rad; of a ride round a circle ... */
     Bound bounds[2];        /* ... and its ends, backwards and forwards */
@@ -169,6 +164,12 @@ typedef struct {
 
 static inline double square(double a) { return a * a; }
 static inline double sign_of(double a) { return a > 0.0 ? 1.0 : a < 0.0 ? -1.0 : 0.0; }
+
+/* Two numbers at once, such as x and y; each is rounded as if alone. */
+typedef double Two __attribute__((vector_size(16), aligned(8)));
+static inline Two two_at(const double *place) { return *(const Two *)place; }
+static inline Two lesser(Two a, Two b) { return __builtin_wasm_pmin_f64x2(a, b); }
+static inline Two larger(Two a, Two b) { return __builtin_wasm_pmax_f64x2(a, b); }
 
 /* exact_pieces.c */
 int lay_obstacles(int member);

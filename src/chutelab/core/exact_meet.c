@@ -30,13 +30,14 @@
 /* In `touch`; circles whose centres and radii differ by no more are at the same place. */
 #define ALIKE 4.0
 
-/* Time at which gap + rate t + acceleration t^2/2 crosses zero downwards; NaN or infinite if it never does, negative if
-   it did in the past.
+/* Time from now at which gap + rate t + acceleration t^2/2 crosses zero downwards; NaN or infinite if it never does, or did
+   in the past.
 
    A parabola crosses any level downwards at most once, with derivative -S, where S^2 = rate^2 - 2 acceleration gap. Of
    both forms of that root, the one without cancellation is used: 2 gap / (S - rate) while closing, -(rate + S) /
    acceleration while opening. */
 double descent(double gap, double rate, double acceleration) {
+    if (rate > 0.0 ? acceleration >= 0.0 : gap < 0.0) return INFINITY;
     double span = fabs(rate) + sqrt(rate * rate - (acceleration + acceleration) * gap);
     /* With zero gap and rate it closes at once if the acceleration is downwards. */
     if (span == 0.0 && gap == 0.0 && acceleration < 0.0) return 0.0;
@@ -87,7 +88,7 @@ static double turning_point(const double *c, double low, double high) {
    polynomial turns back tells whether it crosses zero or only touches it; the coefficients would tell rounding. */
 static int isolate(const double *c, const double *bernstein, double low, double high, int halvings, double *found,
                    int count) {
-    double left[5], right[5];
+    double left[5], right[5], rest[5];
     int below = bernstein[0] < 0.0, changes = 0;
     for (int n = 1; n < 5; n++) changes += (bernstein[n] < 0.0) != (bernstein[n - 1] < 0.0);
     if (changes == 0 || (changes == 1 && below) || count == MOST_ROOTS) return count;
@@ -103,10 +104,10 @@ static int isolate(const double *c, const double *bernstein, double low, double 
         return count;
     }
     /* Coefficients of both halves, after de Casteljau. */
-    for (int n = 0; n < 5; n++) right[n] = bernstein[n];
+    for (int n = 0; n < 5; n++) rest[n] = bernstein[n];
     for (int n = 0; n < 5; n++) {
-        left[n] = right[0];
-        for (int k = 0; k < 4 - n; k++) right[k] = 0.5 * (right[k] + right[k + 1]);
+        left[n] = rest[0], right[4 - n] = rest[4 - n];
+        for (int k = 0; k < 4 - n; k++) rest[k] = 0.5 * (rest[k] + rest[k + 1]);
     }
     double middle = 0.5 * (low + high);
     count = isolate(c, left, low, middle, halvings - 1, found, count);
@@ -158,7 +159,7 @@ static double after_y(const Motion *m, double t) { return m->y + t * (m->vy + 0.
 /* The corner, a sector between two faces, that a point is in at a time, at an end of the obstacle that it is on or
    leaves; else -1. */
 static int corner_of(const Motion *m, double t) {
-    int from = m->on == NONE ? m->left : m->on, side = m->on == NONE ? m->left_side : m->on_side;
+    int from = A.on == NONE ? A.left : A.on, side = A.on == NONE ? A.left_side : A.side;
     return A.point && from != NONE ? corner_at(from, side, after_x(m, t), after_y(m, t)) : NONE;
 }
 
@@ -174,7 +175,7 @@ static int counts(const Motion *m, int circle, double t) {
     return spans(o, x, y) && is_reached(circle, x, y, epoch_at(A.age + t)) && !is_barred(m, circle, 0, t);
 }
 
-typedef struct { double low[2], high[2]; } Box;
+typedef struct { Two low, high; } Box;
 
 /* Lowest and highest coordinates of a path. */
 static Box box_of(const Motion *m, double until) {
@@ -192,13 +193,12 @@ static Box box_of(const Motion *m, double until) {
 }
 
 static int is_near(const Box *box, const Obstacle *o) {
-    return box->low[0] < o->high[0] && box->high[0] > o->low[0] && box->low[1] < o->high[1]
-        && box->high[1] > o->low[1];
+    return __builtin_wasm_all_true_i64x2((box->low < two_at(o->high)) & (box->high > two_at(o->low)));
 }
 
-/* Whether a particle on the incoming belt cannot meet something at whatever height it rides. */
+/* Whether a particle cannot meet something as it rides the incoming belt, at whatever height. */
 static int is_under_belt(int k) {
-    return k == 0 || k == O.pulley || k == O.tips[0].circle || k == O.tips[1].circle;
+    return A.way == RIDES_BELT && (k == 0 || k == O.pulley || k == O.tips[0].circle || k == O.tips[1].circle);
 }
 
 /* Whether a point is in a corner now that something bounds. */
@@ -210,27 +210,22 @@ static int is_bound(const Motion *m, int k, int side) {
 /* When a face of a segment is met from a side, at most `until`; else infinite. */
 static double meet_face(const Motion *m, int k, int side, double until) {
     const Obstacle *o = O.all + k;
-    double dx = m->x - o->x, dy = m->y - o->y;
-    double height = dx * o->nx + dy * o->ny, foot = dx * o->tx + dy * o->ty;
-    double pace = m->vx * o->tx + m->vy * o->ty, push = m->ax * o->tx + m->ay * o->ty;
-    double gap = side * height - A.given->radius, rate = side * (m->vx * o->nx + m->vy * o->ny);
-    double fall = side * (m->ax * o->nx + m->ay * o->ny);
-    int shared = is_shared(m->joint, k, side < 0), leaving = m->left == k || shared;
-    int same = (m->left == k && m->left_side == side) || shared;
-    int beside = is_bound(m, k, side), touching = fabs(gap) <= O.touch || same || beside, grazing = 0;
-    if (touching) {
+    int shared = is_shared(A.joint, k, side < 0), same = (A.left == k && A.left_side == side) || shared;
+    if ((A.left == k || shared) && !(same && A.order <= 1)) return INFINITY;
+    int beside = same || is_bound(m, k, side), grazing = 0;
+    double dx = m->x - o->x, dy = m->y - o->y, gap = side * (dx * o->nx + dy * o->ny) - A.given->radius;
+    double rate = side * (m->vx * o->nx + m->vy * o->ny), fall = side * (m->ax * o->nx + m->ay * o->ny);
+    if (fabs(gap) <= O.touch || beside) {
         gap = 0.0;
         grazing = fabs(rate) <= PARALLEL * speed_of(m);
         if (grazing && !same) rate = 0.0;
         if (grazing && fabs(fall) <= PARALLEL * length_of(m->ax, m->ay)) fall = 0.0;
     }
     double time = descent(gap, rate, fall);
-    if (!(time >= 0.0 && time <= until) || (leaving && !(same && m->order <= 1)) || m->on == k)
-        return INFINITY;
-    if (is_barred(m, k, side, time)) return INFINITY;
+    if (!(time <= until) || is_barred(m, k, side, time)) return INFINITY;
     /* How far along the segment the contact is. */
-    double over = FOOT * o->length;
-    foot += time * (pace + (0.5 * time) * push);
+    double pace = m->vx * o->tx + m->vy * o->ty, push = m->ax * o->tx + m->ay * o->ty, over = FOOT * o->length;
+    double foot = dx * o->tx + dy * o->ty + time * (pace + (0.5 * time) * push);
     if (!(foot >= -over && foot <= over + o->length)) return INFINITY;
     /* A particle that grazes the end while moving outwards does not lie on the face. */
     if (grazing && ((foot <= over && pace < 0.0) || (foot >= o->length - over && pace > 0.0)))
@@ -263,7 +258,7 @@ static double enter(const Motion *m, int k, double until) {
         /* Unit vectors from the centre to the end, and out of the arc there. */
         const Tip *tip = O.tips + 2 * (O.faces + (k - O.first_arc) % O.arcs) + end;
         double across = tip->left[0], up = tip->left[1], ax = tip->out[0], ay = tip->out[1];
-        double ahead = has_edge(m->joint, k, end) ? 0.0 : ax * dx + ay * dy;
+        double ahead = has_edge(A.joint, k, end) ? 0.0 : ax * dx + ay * dy;
         double time = descent(ahead, ax * m->vx + ay * m->vy, ax * m->ax + ay * m->ay);
         if (!(time > 0.0 && time < until)) continue;
         double x = dx + time * (m->vx + 0.5 * time * m->ax), vx = m->vx + time * m->ax;
@@ -300,13 +295,13 @@ static double meet_circle(const Motion *m, int k, double until) {
         0.25 * (m->ax * m->ax + m->ay * m->ay) };
     for (int n = 0; n < 5; n++) gap[n] *= sense;
     /* Arcs that lie on each other, or on the pulley, are left together. */
-    int leaving = m->left == k || (O.arcs && is_alike(k, m->left)) || is_shared(m->joint, k, 0);
+    int leaving = A.left == k || (O.arcs && is_alike(k, A.left)) || is_shared(A.joint, k, 0);
     int beside = is_bound(m, k, 0), touching = fabs(distance - rho) <= O.touch || beside;
     /* The direction from the centre is uncertain by the rounding of the places over rho. */
     double uncertain = 2.0 * (PARALLEL * rho + O.touch) * speed_of(m);
     if (touching && fabs(gap[1]) <= uncertain && !leaving) gap[1] = 0.0;
     int closing = touching && gap[1] < 0.0;
-    int order = leaving ? m->order : touching && !closing ? 1 : 0, falls = 0, rises = 0;
+    int order = leaving ? A.order : touching && !closing ? 1 : 0, falls = 0, rises = 0;
     if (closing && !leaving && counts(m, k, 0.0)) return 0.0;
     for (int n = 0; n < order; n++) {
         for (int c = 0; c < 4; c++) gap[c] = gap[c + 1];
@@ -330,17 +325,17 @@ static double meet_circle(const Motion *m, int k, double until) {
 
 /* Whether a particle cannot meet a circle because of what it touches or has just left. */
 static int is_hidden(const Motion *m, int k) {
-    int left = m->left;
-    if (m->on != NONE && is_beside(k, m->on, m->on_side < 0)) return 1;
+    int left = A.left;
+    if (A.on != NONE && is_beside(k, A.on, A.side < 0)) return 1;
     if (left == NONE) return 0;
     const Obstacle *o = O.all + left;
     if (left >= O.faces)
         /* It left the circle tangentially and its speed does not fall: all terms of the gap grow. */
-        return left == k && m->order >= FROM_CURVE && m->vx * m->ax + m->vy * m->ay >= 0.0
+        return left == k && A.order >= FROM_CURVE && m->vx * m->ax + m->vy * m->ay >= 0.0
             && !(O.arcs && o->rho < 0.0);
     /* A face that is left with an acceleration away from it hides its own two ends, like a face that is slid on. */
     return (O.tips[2 * left].circle == k || O.tips[2 * left + 1].circle == k)
-        && m->left_side * (m->ax * o->nx + m->ay * o->ny) >= 0.0;
+        && A.left_side * (m->ax * o->nx + m->ay * o->ny) >= 0.0;
 }
 
 /* Find what a particle meets first, and whether that is at or before `until` (s from now, finite), which then becomes the
@@ -353,7 +348,7 @@ int first_contact(const Motion *m, double *until, int *obstacle, int *side) {
     double first = INFINITY, soonest = INFINITY;
     int circle = NONE;
     for (int k = 0; k < O.faces; k++) {
-        if (!is_near(&box, O.all + k) || (m->carried && is_under_belt(k))) continue;
+        if (k == A.on || !is_near(&box, O.all + k) || is_under_belt(k)) continue;
         for (int face = 1; face >= -1; face -= 2) {
             double time = meet_face(m, k, face, *until);
             if (time < first) first = time, *obstacle = k, *side = face;
@@ -362,7 +357,7 @@ int first_contact(const Motion *m, double *until, int *obstacle, int *side) {
     int hits = first <= *until;
     if (hits) *until = first, box = box_of(m, first);
     for (int k = O.faces; k < O.count; k++) {
-        if (!is_near(&box, O.all + k) || (m->carried && is_under_belt(k)) || is_hidden(m, k)) continue;
+        if (!is_near(&box, O.all + k) || is_under_belt(k) || is_hidden(m, k)) continue;
         double time = meet_circle(m, k, *until);
         if (time < soonest) soonest = time, circle = k;
     }
@@ -386,12 +381,10 @@ static void list_stops(int circle, int side, int epoch) {
     const Obstacle *c = O.all + circle;
     double facing = sign_of(c->rho), rho = c->rho;
     O.stop_count = 0, O.stops_on = circle, O.stops_side = side, O.stops_epoch = epoch, O.stops_rho = rho;
-    double reach = fabs(rho);
-    Box box = { { c->x - reach, c->y - reach }, { c->x + reach, c->y + reach } };
-    for (int n = 0; n < 2 && c->extent < TURN; n++) {
-        box.low[n] = MAX(box.low[n], c->low[n] - O.touch);
-        box.high[n] = MIN(box.high[n], c->high[n] + O.touch);
-    }
+    Two center = two_at(&c->x);
+    Box box = { center - fabs(rho), center + fabs(rho) };
+    if (c->extent < TURN)
+        box = (Box){ larger(box.low, two_at(c->low) - O.touch), lesser(box.high, two_at(c->high) + O.touch) };
     for (int k = 0; k < O.faces; k++)
         for (int n = 0; n < 2 && is_near(&box, O.all + k); n++) {
             const Obstacle *o = O.all + k;

@@ -29,9 +29,6 @@
 /* Share of the longest h that the curve allows at the beginning: it may allow less later on. */
 #define FIRST 0.85
 
-/* Two numbers at once; each is rounded as if alone. */
-typedef double Two __attribute__((vector_size(16)));
-
 static const Two PLACE[PAIRS] = {
     { 0.01985507175123188416, 0.98014492824876811584 }, { 0.10166676129318663020, 0.89833323870681336980 },
     { 0.23723379504183550709, 0.76276620495816449291 }, { 0.40828267875217509753, 0.59171732124782490247 },

@@ -30,8 +30,6 @@
 
 /* One term more than is used: the recursion also gives that of the next order. */
 typedef double Series[ORDER + 2];
-/* Two numbers at once; each is rounded as if alone. */
-typedef double Two __attribute__((vector_size(16)));
 
 static Series phi, w, z, work, heat, twist, normal, force, couple;
 

@@ -343,7 +343,8 @@ def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
     events, each = recording.events, recording.count // len(holds)
     kinds = [int(kind) for kind in (Kind.SEPARATION, Kind.IMPACT, Kind.LANDING, *OTHER)]
     if each > 1:
-        events = events.take((recording.labels[2] % each == 0).nonzero()[0])
+        own = np.arange(recording.count) % each == 0
+        events = events.take(own[recording.labels[2]].nonzero()[0])
     # Grip and slip on the belt and the pulley are in the equations.
     known = events["kind"] == Kind.STICK
     known &= events["surface"] == recording.surface_index("incoming")

@@ -9,6 +9,7 @@ from scipy.special import ellipk
 
 from chutelab import simulate, start
 from chutelab.machine import build
+from chutelab.results import Kind
 from chutelab.scene import SceneError, from_dict
 from shared import seeds
 
@@ -613,3 +614,27 @@ def test_what_is_released_beside_a_pendulum_is_in_the_sums_at_once():
     total = found["kinetic"] + found["potential"]
     assert total == pytest.approx(0.1 * G * (0.31 + 3 * 0.01), abs=1e-9)
     assert np.abs(found["residual"]).max() < 1e-12
+
+
+@pytest.mark.parametrize("joint", [{}, {"string": {"length": 5.0}}, {"rod": {}}])
+def test_an_impact_turns_a_disk_with_rolling_friction_whatever_joint_it_has(joint):
+    """Its moment is f r J about the centre, on which strings and rods act: ω' = ω - f r J / I.
+
+    The wall is smooth; before, the disk kept its 80 rad/s if it had a joint, even a slack one.
+    """
+    r, m, f, spin = 0.01, 0.05, 0.1, 80.0
+    tables = {
+        "particle": {"radius": r, "mass": m, "spin": True, "rolling_friction": f},
+        "surface": [{"name": "wall", "from": [0.0, -1.0], "to": [0.0, 1.0], "restitution": 0.5,
+                     "friction": 0.0}],
+        "stream": {"at": [-0.06, 0.0], "velocity": [1.0, 0.0], "omega": spin, "interact": True},
+        "gravity": 0.0,
+        "run": {"until": 0.1},
+    }  # fmt: skip
+    for kind, keys in joint.items():
+        tables[kind] = [{"particle": 0, "from": [-0.06, 0.4], **keys}]
+    events = simulate(tables, engine="contact").events
+    (blow,) = events[events["kind"] == Kind.IMPACT][:1]
+    turned = f * r * blow["normal_impulse"] / (0.5 * m * r**2)
+    assert turned > 25.0
+    assert blow["omega_after"] == pytest.approx(spin - turned, rel=1e-12)

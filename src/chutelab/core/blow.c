@@ -1,6 +1,7 @@
 /* The impulses of an impact of two particles of which one has corners, or of one and a surface, at all places at which they
    touch; and those of a disk at a hinge. */
 
+#include <string.h>
 #include "core.h"
 
 /* Greatest number of sweeps over the places of an impact, and the share of its size at which they end. */
@@ -20,7 +21,7 @@
 /* Whether a struck particle has joints, which respond to each impulse of the impact. */
 static int answers;
 
-void give_all(const Contact *c, const double *impulse) {
+static void give_all(const Contact *c, const double *impulse) {
     push(c, impulse);
     if (answers) answer_with_joints();
 }
@@ -39,7 +40,7 @@ static double along_both(const Contact *c, int n, const Contact *o, int k) {
 
 /* Set the matrix of an impact. If joints respond, it is measured by impulses that change velocities by about `size`, m/s,
    and are taken back; joints may hold a place entirely. */
-void find_matrix(Contact *list, int count, double size, int joined) {
+static void find_matrix(Contact *list, int count, double size, int joined) {
     answers = joined;
     for (int m = 0; m < 3 * count; m++) {
         const Contact *c = list + m / 3;
@@ -75,7 +76,7 @@ void find_matrix(Contact *list, int count, double size, int joined) {
 /* Bound on a tangential impulse or a moment per normal impulse. */
 static double bound_of(const Contact *c, int n, double share) {
     if (n == 1) return share * MIN(c->friction, share < 1 ? ROUGH : INFINITY);
-    return answers ? 0 : share * c->arm;
+    return share * c->arm;
 }
 
 /* Change one impulse of an impact, and with it the velocities at all places. */
@@ -184,7 +185,7 @@ static void solve_directly(Contact *list, int count, const double *back, double 
 }
 
 /* Find impulses at all places such that no gap closes, or that it opens as fast as restitution asks for; friction, scaled
-   by `share`, stops slip within its bound, and rolling friction the rolling of a disk, unless there are joints. */
+   by `share`, stops slip within its bound, and rolling friction the rolling of a disk. */
 static void solve_impact(Contact *list, int count, const double *back, double share) {
     double size = 0, v[MOST];
     for (int n = 0; n < count; n++) {
@@ -221,7 +222,7 @@ static void solve_impact(Contact *list, int count, const double *back, double sh
 /* Find the impulses of an impact. Newton's restitution with friction, or at several places, may seem to create energy if
    one impulse changes the velocity at another place (T. R. Kane, J. Appl. Mech. 51, 1984). Then friction is reduced, and
    finally restitution is 0, which never creates energy. `u` are the velocities before. Return the loss, J. */
-double solve_with_energy(Contact *list, int count, double *back, const double (*u)[3]) {
+static double solve_with_energy(Contact *list, int count, double *back, const double (*u)[3]) {
     for (double share = 1;;) {
         double lost = 0, size = 0, v[3];
         solve_impact(list, count, back, share);
@@ -243,6 +244,29 @@ double solve_with_energy(Contact *list, int count, double *back, const double (*
         }
         share = share > 0.1 ? 0.5 * share : share > 0 ? 0 : 1;
     }
+}
+
+/* Find the impulses of an impact at some places, and of the joints that respond, and give them. `size` is the fastest
+   approach, `u` are the velocities before. `back`, the velocities after, is changed where a hinge stands. Return the
+   loss, J. */
+double find_blow(Contact *list, int count, double size, int joined, double (*u)[3], double *back) {
+    double lost = 0;
+    if (joined) begin_answers();
+    for (int again = 1; again;) {
+        double wanted[MOST_TOUCHES];
+        memcpy(wanted, back, count * sizeof *back);
+        find_matrix(list, count, size, joined);
+        lost = solve_with_energy(list, count, wanted, u);
+        int lets_go = joined && let_go_again();
+        again = lets_go || hold_hinge(list, count, u, back);
+        for (int n = 0; n < count && again; n++) {
+            double *J = list[n].impulse, none[3] = {-J[0], -J[1], -J[2]};
+            if (lets_go) push(list + n, none);
+            else give_all(list + n, none);
+            J[0] = J[1] = J[2] = 0;
+        }
+    }
+    return lost;
 }
 
 /* Friction (1) or rolling friction (2) that stops a slip or a relative rotation, as far as its bound allows, with the

@@ -297,7 +297,6 @@ void swing_away(const Contact *c, int earlier, double *out);
 double swung_open(const Contact *c);
 void push_hinge(const Contact *c, const double *J);
 double hinge_share(const Contact *c);
-double coupled(const Contact *c);
 void strike_hinge(int mover, double t);
 void leave_struck(int mover);
 int hold_hinge(Contact *list, int count, double (*u)[3], double *back);
@@ -336,7 +335,6 @@ void begin_answers(void);
 void forget_answers(void);
 void answer_with_joints(void);
 int let_go_again(void);
-void share_with_joints(const Contact *c, double wanted, const double *u, double *J);
 
 /* tied.c */
 void agree_with_contacts(double h);
@@ -374,9 +372,7 @@ int list_struck(int i, int j, double t, Contact *list);
 void strike_corners(int i, int j, double t);
 
 /* blow.c */
-void give_all(const Contact *c, const double *impulse);
-void find_matrix(Contact *list, int count, double size, int joined);
-double solve_with_energy(Contact *list, int count, double *back, const double (*u)[3]);
+double find_blow(Contact *list, int count, double size, int joined, double (*u)[3], double *back);
 void couple(const Contact *c, double wanted, const double *u, double *J);
 
 /* trigger.c */

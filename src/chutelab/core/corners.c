@@ -478,21 +478,7 @@ RARELY void strike_corners(int i, int j, double t) {
     if (!(fastest > ROUNDS * (fabs(a->vx) + fabs(a->vy)))) return;
     if (two) was_moved(j);
     double before[3] = {a->vx, a->vy, a->spin}, lost, normal = 0, slip = 0;
-    if (answers) begin_answers();
-    for (int again = 1; again;) {
-        double wanted[MOST_TOUCHES];
-        memcpy(wanted, back, sizeof back);
-        find_matrix(list, count, fastest, answers);
-        lost = solve_with_energy(list, count, wanted, u);
-        int lets_go = answers && let_go_again();
-        again = lets_go || hold_hinge(list, count, u, back);
-        for (int n = 0; n < count && again; n++) {
-            double *J = list[n].impulse, none[3] = {-J[0], -J[1], -J[2]};
-            if (lets_go) push(list + n, none);
-            else give_all(list + n, none);
-            J[0] = J[1] = J[2] = 0;
-        }
-    }
+    lost = find_blow(list, count, fastest, answers, u, back);
     for (int n = 0; n < count; n++) {
         Contact *c = list + n;
         double v[3], given[3];

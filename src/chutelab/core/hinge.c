@@ -410,9 +410,6 @@ double swung(const Contact *c, double f) {
 /* Work of a contact's impulses by the angular velocity of the hinge that isn't part of the energy law of a solve, J. */
 double hinge_share(const Contact *c) { return moment_of(c, c->impulse) * c->turning; }
 
-/* Change of the slip per normal impulse, and of the normal velocity per tangential impulse, through the hinge, 1/kg. */
-double coupled(const Contact *c) { return c->lever[0] * c->lever[1] / hinge_of(c)->inertia; }
-
 /* Turn a hinge, given by the owner of its surfaces, with a torque until the next call. */
 EXPORT void turn_hinge(int owner, double torque) {
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {

@@ -308,14 +308,16 @@ static void give(Contact *c, double normal) {
     J[0] = normal;
     J[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
     J[2] = 0;
-    if (tied) share_with_joints(c, normal / c->mass[0], u, J);
-    else if (swings) {
+    if (tied) {
+        J[0] = J[1] = 0;
+        double back = u[0] + normal / c->mass[0];
+        find_blow(c, 1, fabs(u[0]), 1, &u, &back);
+    } else if (swings) {
         const double before[3] = {u[0], u[1] + c->drift, u[2]};
         couple(c, normal / c->mass[0], before, J);
     }
-    memcpy(more, J, sizeof more);
     if (tied || swings) arm = 0;
-    push(c, more);
+    if (!tied) push(c, J);
     relative(c, 0, v);
     if (arm > 0) {
         stop_turning(c, most, arm, v, more);

@@ -628,61 +628,7 @@ void end_blow(void) {
     }
 }
 
-/* The normal and tangential impulse of an impact that change the normal velocity by `wanted`, m/s, if joints respond at
-   the same instant; they give their impulses here. If restitution and friction together would create energy (Kane, J.
-   Appl. Mech. 51, 1984), there is no friction. `u` are normal velocity and slip before. */
-void share_with_joints(const Contact *c, double wanted, const double *u, double *J) {
-    JointRow *rows = W.joint_rows, *end = rows + W.joint_row_count;
-    const double way[2][2] = {{c->nx, c->ny}, {c->ny, -c->nx}}, both = c->hung ? coupled(c) : 0;
-    aim_now(1);
-    do {
-        double feel[2][2] = {{1 / c->mass[0], both}, {both, 1 / c->mass[1]}};
-        factor(1, 0);
-        for (int n = 0; n < 2; n++) {
-            for (JointRow *r = rows; r < end; r++) {
-                r->struck[n] = 0;
-                for (int side = 0; side < 2 && r->on; side++) {
-                    const Disk *d = at_end(2 * r->joint + side);
-                    int first = d == W.disks + c->i;
-                    if (!d || !(first || (c->two && d == W.disks + c->j))) continue;
-                    const double *e = r->e + 2 * side;
-                    double rate = (first ? 1 : -1) * (e[0] * way[n][0] + e[1] * way[n][1]) * d->inv_mass;
-                    if (n) rate += r->lever[side] * d->radius * d->inv_inertia;
-                    r->struck[n] += rate;
-                }
-                r->off = -r->struck[n];
-            }
-            solve();
-            for (JointRow *r = rows; r < end; r++) r->answer[n] = r->on ? r->off : 0;
-        }
-        for (JointRow *r = rows; r < end; r++)
-            for (int n = 0; n < 4; n++) feel[n / 2][n % 2] += r->struck[n / 2] * r->answer[n % 2];
-        double less = feel[0][0] * feel[1][1] - feel[0][1] * feel[1][0];
-        J[0] = J[1] = 0;
-        /* Joints may hold it entirely. */
-        if (!(feel[0][0] > DEPENDS / c->mass[0])) break;
-        J[0] = wanted / feel[0][0];
-        if (c->friction > 0 && less > DEPENDS * feel[0][0] * feel[1][1]) {
-            J[0] = (wanted * feel[1][1] + u[1] * feel[0][1]) / less;
-            J[1] = (-u[1] * feel[0][0] - wanted * feel[1][0]) / less;
-        }
-        if (fabs(J[1]) > c->friction * J[0]) {
-            double way = J[1] > 0 ? c->friction : -c->friction;
-            J[0] = wanted / (feel[0][0] + way * feel[0][1]);
-            J[1] = way * J[0];
-        }
-        double gained = J[0] * (u[0] + 0.5 * (feel[0][0] * J[0] + feel[0][1] * J[1]))
-            + J[1] * (u[1] + 0.5 * (feel[1][0] * J[0] + feel[1][1] * J[1]));
-        if (!(J[0] > 0 && gained <= 0)) {
-            J[0] = wanted / feel[0][0];
-            J[1] = 0;
-        }
-        for (JointRow *r = rows; r < end; r++) r->off = J[0] * r->answer[0] + J[1] * r->answer[1];
-    } while (let_go());
-    give_impulses();
-}
-
-/* Let joints respond to an impact at several places, whose impulses are found one by one, at this instant; see
+/* Let joints respond to an impact, whose impulses are found one by one, at this instant; see
    `answer_with_joints`. */
 void begin_answers(void) {
     aim_now(1);
@@ -695,7 +641,7 @@ void begin_answers(void) {
 }
 
 void forget_answers(void) {
-    for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) r->answer[0] = 0;
+    for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) r->answer = 0;
 }
 
 /* Give the joints' impulses that stop the rates caused by the impulses given to particles so far. */
@@ -703,7 +649,7 @@ void answer_with_joints(void) {
     for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) r->off = -rate_of(r);
     solve();
     for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) {
-        if (r->on) r->answer[0] += r->off;
+        if (r->on) r->answer += r->off;
         for (int end = 0; end < 2 && r->on; end++) {
             Disk *d = at_end(2 * r->joint + end);
             if (d) tug(r, end, r->off, &d->vx, &d->spin);
@@ -714,14 +660,14 @@ void answer_with_joints(void) {
 /* Release strings that would push by their responses, and take all responses back; return whether there are any. */
 int let_go_again(void) {
     JointRow *rows = W.joint_rows, *last = rows + W.joint_row_count;
-    for (JointRow *r = rows; r < last; r++) r->off = r->answer[0];
+    for (JointRow *r = rows; r < last; r++) r->off = r->answer;
     if (!let_go()) return 0;
     for (JointRow *r = rows; r < last; r++) {
-        for (int end = 0; end < 2 && r->answer[0] != 0; end++) {
+        for (int end = 0; end < 2 && r->answer != 0; end++) {
             Disk *d = at_end(2 * r->joint + end);
-            if (d) tug(r, end, -r->answer[0], &d->vx, &d->spin);
+            if (d) tug(r, end, -r->answer, &d->vx, &d->spin);
         }
-        r->answer[0] = 0;
+        r->answer = 0;
     }
     factor(1, 0);
     return 1;

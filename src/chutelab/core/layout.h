@@ -254,7 +254,7 @@ typedef struct {
 typedef struct {
     double e[4], lever[2];  /* directions and levers with which its impulse acts on the particle and on the other one; m */
     double kick;            /* N s; half of its impulse in a step; above 0 it pushes them apart */
-    double struck[2], answer[2]; /* 1/kg, N s; rate by which an impact of 1 N s lengthens it, and its response */
+    double answer;          /* N s; its response to an impact */
     double off, eases;      /* m, m/(N s); by how much it is missed, and compliance of a spring */
     double root;            /* pivot: its element of the diagonal matrix of the factors */
     int joint, on;          /* whether it acts */

@@ -29,7 +29,19 @@ from chutelab.results import Kind
 from chutelab.scene import from_dict
 from sandbox import bodies
 from test_hinge import drawn as hung
-from transformed import Law, alone, mirrored, reordered, resized, scaled, shifted, turned, untwinned
+from transformed import (
+    Law,
+    alone,
+    cut,
+    mirrored,
+    reordered,
+    resized,
+    scaled,
+    shifted,
+    turned,
+    untwinned,
+    with_more_above,
+)
 
 FAMILIES = {
     "oddities": (oddities.tables, "contact"),
@@ -83,6 +95,8 @@ TRANSFORMATIONS = {
     "four times as large": partial(resized, length=4.0),
     "a sixteenth": partial(resized, length=0.0625),
     "reordered": partial(reordered, seed=5),
+    "cut": partial(cut, seed=2),
+    "cut elsewhere": partial(cut, seed=5),
 }
 
 
@@ -257,6 +271,90 @@ def test_many_transformed_machines_run_as_their_law_says(family, name):
 def test_most_machines_are_compared(family):
     """So that what is left out as chaotic does not hide what is wrong."""
     assert np.mean([drawn(family, seed) is not None for seed in range(FEW[family])]) > 0.8
+
+
+@pytest.mark.filterwarnings("ignore:LAW BROKEN")
+@pytest.mark.parametrize("family", FAMILIES)
+def test_surfaces_that_nothing_reaches_change_no_bit(family):
+    """A further mover, hinge, joint or trigger may: steps and the choice of solver follow.
+
+    The exact engine rounds as a machine of its size does, which is then 30 m.
+    """
+    allowed = ROUNDING if FAMILIES[family][1] == "exact" else 0.0
+    for seed in range(FEW[family]):
+        it = drawn(family, seed)
+        if it is None or it.tables.get("gravity", 9.81) == 0.0:
+            continue
+        tables, law = with_more_above(it.tables)
+        run = chutelab.simulate(tables, engine=FAMILIES[family][1])
+        assert apart(state(run, law), it.end) <= allowed
+
+
+def sliding(*floors):
+    """Return the end of a disk on a spring that slides along a floor, in a run as a crowd."""
+    tables = {
+        "particle": {"radius": 0.0134, "mass": 0.2, "spin": True},
+        "surface": [{"restitution": 0.0, "friction": 0.5, **floor} for floor in floors],
+        "stream": {"at": [-0.1, 0.0134], "velocity": [0.8, 0.0], "omega": -60.0},
+        "spring": [{"particle": 0, "from": [0.1, 0.3], "stiffness": 20.0, "damper": 0.3}],
+        "run": {"until": 0.4},
+    }
+    return np.hstack(state(chutelab.simulate(tables, engine="contact"), Law())[:3])
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.3])
+def test_a_disk_slides_over_a_joint_of_straight_pieces_as_over_none(speed):
+    """Its contact goes on: the sweeps of a crowd begin with its impulse. It was off by 3e-5 m."""
+    whole = sliding({"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], "speed": speed})
+    for x in (-0.05, 0.0131, 0.05):
+        points = [[-1.0, 0.0], [x, 0.0], [1.0, 0.0]]
+        one = {"name": "floor", "points": points, "speed": speed}
+        two = [one | {"points": points[:2]}, one | {"name": "more", "points": points[1:]}]
+        assert np.abs(sliding(one) - whole).max() < 1e-7
+        assert np.abs(sliding(*two) - whole).max() < 1e-7
+
+
+def test_steps_do_not_depend_on_how_a_surface_that_turns_is_written():
+    """They follow from its furthest point, 0.5 m from the pivot: g + (2π)² 0.5 m presses."""
+    steps = set()
+    ends = np.array([[-0.5, 0.0], [0.1, 0.4]])
+    for angle in (0.0, 0.7):
+        turned = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        for middle in ([], [0.1], [0.4, 0.8]):
+            points = [((1.0 - s) * ends[0] + s * ends[1]) @ turned for s in (0.0, *middle, 1.0)]
+            tables = {
+                "particle": {"radius": 0.001, "mass": 0.1},
+                "surface": [{"name": "bar", "points": np.array(points).tolist(), "turn": 360.0,
+                             "pivot": [0.0, 0.0]}],
+                "stream": {"at": [0.0, 0.6], "velocity": [0.0, 0.0]},
+                "string": [{"particle": 0, "from": [0.0, 0.7]}],
+                "run": {"until": 0.3, "dt": 0.01},
+            }  # fmt: skip
+            steps.add(chutelab.simulate(tables, engine="contact").steps)
+    assert len(steps) == 1
+
+
+@pytest.mark.parametrize("kink", [-0.004, 0.004, 0.009])
+def test_a_box_far_away_does_not_change_what_a_disk_slides_over(kink):
+    """Pieces at less than 0.01 rad count as smooth for all; before, only where a box was."""
+    turns = kink * np.arange(10)
+    steps = 0.1 * np.array([np.cos(turns), np.sin(turns)]).T
+    points = np.vstack([[-1.0, 0.0], np.cumsum(steps, axis=0) - [1.0, 0.0]]).tolist()
+    ways = []
+    for shape in ({"radius": 0.02}, {"shape": "box", "size": [0.02, 0.02]}):
+        tables = {
+            "particle": [{"name": "disk", "radius": 0.01, "mass": 0.05, "spin": True},
+                         {"name": "other", "mass": 0.1, **shape}],
+            "surface": [{"name": "floor", "points": points, "restitution": 0.6, "friction": 0.2},
+                        {"name": "far", "from": [3.0, -1.0], "to": [4.0, -1.0]}],
+            "stream": [{"particle": "disk", "at": [-0.98, 0.01], "velocity": [2.0, 0.0],
+                        "interact": True},
+                       {"particle": "other", "at": [3.5, -0.5], "velocity": [0.0, 0.0]}],
+            "run": {"until": 0.35},
+        }  # fmt: skip
+        run = chutelab.simulate(tables, engine="contact")
+        ways.append(run.at([0.1, 0.2, 0.349]).position[:, 0])
+    assert np.abs(ways[0] - ways[1]).max() < 1e-8
 
 
 @cache

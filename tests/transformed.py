@@ -1,4 +1,4 @@
-"""Machines once more: mirrored, shifted, turned, scaled, with other masses, in another order.
+"""Machines once more: mirrored, shifted, turned, scaled, with other masses, in another order, cut.
 
 Each takes the tables of a scene of surfaces, joints and single particles (see `alone`), and returns
 others and the `Law` by which the results of their run follow from those of the first.
@@ -233,3 +233,61 @@ def reordered(tables, seed):
             if "speed" in row:
                 row["speed"] = -row["speed"]
     return found, Law(order=tuple(place.tolist()))
+
+
+def cut(tables, seed):
+    """Straight pieces and arcs in two, at any place; the two are one surface, or each is its own.
+
+    One surface stays what hangs, what a trigger or a pair names, and what appears, vanishes or
+    lets through: it acts as a whole, and an arc is then not cut.
+    """
+    found, random = copy.deepcopy(tables), np.random.default_rng([3, seed])
+    named = {name for pair in found.get("pair", []) for name in pair["between"]}
+    for row in found["surface"]:
+        named |= {row[key]["touched"] for key in row if key.endswith("_when")}
+    rows = []
+    for row in found["surface"]:
+        whole = row["name"] in named or "hinge" in row or "passes" in row
+        whole |= any(key.startswith(("opens", "closes", "starts")) for key in row)
+        row |= {"pivot": _pivot(row)} if {"turn", "travel"} & {*row} else {}
+        place = random.uniform(0.1, 0.9)
+        if "center" in row:
+            ends = row.get("from_deg", 0.0), row.get("to_deg", 360.0)
+            middle = (1.0 - place) * ends[0] + place * ends[1]
+            parts = [{"from_deg": ends[0], "to_deg": middle},
+                     {"from_deg": middle, "to_deg": ends[1]}]  # fmt: skip
+            rows += [row] if whole or "repeat" in row else _apart(row, parts)
+            continue
+        points = row.get("points") or [row["from"], row["to"]]
+        n = int(random.integers(1, len(points)))
+        middle = (1.0 - place) * np.array(points[n - 1]) + place * np.array(points[n])
+        points = [*points[:n], middle.tolist(), *points[n:]]
+        bare = {key: value for key, value in row.items() if key not in ("from", "to")}
+        parts = [{"points": points[: n + 1]}, {"points": points[n:]}]
+        one = whole or random.random() < 0.5
+        rows += [bare | {"points": points}] if one else _apart(bare, parts)
+    found["surface"] = rows
+    return found, Law()
+
+
+def with_more_above(tables):
+    """Add a line, an arc, a belt and a gate, from which gravity pulls all that there is away.
+
+    Not below, as tracks end below the lowest surface.
+    """
+    found, angle = copy.deepcopy(tables), radians(tables.get("gravity_deg", 0.0))
+    up, side = np.array([-sin(angle), cos(angle)]), np.array([cos(angle), sin(angle)])
+    line = {"from": (20.0 * up - side).tolist(), "to": (20.0 * up + side).tolist()}
+    arc = {"center": (30.0 * up).tolist(), "radius": 1.0, "from_deg": 0.0, "to_deg": 120.0}
+    for n, row in enumerate((line, arc, line | {"speed": 1.0}, line | {"opens_at": 9.0})):
+        found["surface"].append({"name": f"above{n}", "restitution": 0.5, "friction": 0.3, **row})
+    return found, Law()
+
+
+def _pivot(row):
+    first = row.get("center") or row.get("from") or row["points"][0]
+    return row.get("pivot", first)
+
+
+def _apart(row, parts):
+    return [row | part | {"name": f"{row['name']}{n or ''}"} for n, part in enumerate(parts)]

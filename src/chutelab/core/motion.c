@@ -240,11 +240,19 @@ int find_mover(const Surface *s) {
     return -1;
 }
 
+/* Distance of the point of a piece that is furthest from a pivot, m. It does not depend on directions, or on how many
+   pieces a surface is written in: steps follow from it. */
+static double furthest_from(const double *pivot, const Surface *s) {
+    double x = s->x - pivot[0], y = s->y - pivot[1], away = hypot(x, y);
+    if (s->shape == CIRCLE) return away + s->radius;
+    if (s->shape == ARC && x * s->tx + y * s->ty >= s->cos_half * away) return away + s->radius;
+    return MAX(hypot(s->end[0] - pivot[0], s->end[1] - pivot[1]), hypot(s->end[2] - pivot[0], s->end[3] - pivot[1]));
+}
+
 /* Let a surface begin to move from its written position. */
 void prepare_mover(Surface *s) {
     Mover *m = W.movers + s->mover;
-    double x = MAX(fabs(s->box[0] - m->pivot[0]), fabs(s->box[2] - m->pivot[0]));
-    double y = MAX(fabs(s->box[1] - m->pivot[1]), fabs(s->box[3] - m->pivot[1])), reach = hypot(x, y);
+    double reach = furthest_from(m->pivot, s);
     double rate = 2 * PI * m->frequency, by = hypot(m->by[0], m->by[1]), way = hypot(m->way[0], m->way[1]);
     double lasts = m->lasts > 0 ? m->lasts : INFINITY;
     for (int n = 0; n < 4; n++) {

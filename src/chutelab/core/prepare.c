@@ -135,8 +135,20 @@ static int first_near(int end, double r, double *last) {
     return low;
 }
 
-/* Set which piece continues smoothly beyond an end: beyond a segment an arc or a circle, beyond an arc also a segment; or
-   -1. For particles with corners, which may lie on both, also one segment beyond another. */
+/* Whether it moves as its file says, from the beginning on: no hinge, trigger or hand moves it. */
+static int is_driven(const Mover *m) { return !(m->inertia > 0) && !m->steered && m->begins == 0; }
+
+/* Whether two pieces stay where they are to each other: they are of one surface, do not move, or are driven alike. */
+static int move_alike(const Surface *s, const Surface *next) {
+    const Mover *a = W.movers + MAX(s->mover, 0), *b = W.movers + MAX(next->mover, 0);
+    if (s->mover == next->mover) return 1;
+    if (s->mover < 0 || next->mover < 0 || !is_driven(a) || !is_driven(b)) return 0;
+    if (a->turn != b->turn || (a->turn != 0 && (a->pivot[0] != b->pivot[0] || a->pivot[1] != b->pivot[1]))) return 0;
+    return a->by[0] == b->by[0] && a->by[1] == b->by[1] && a->frequency == b->frequency && a->phase == b->phase
+        && a->way[0] == b->way[0] && a->way[1] == b->way[1] && a->from == b->from && a->lasts == b->lasts;
+}
+
+/* Set which piece continues smoothly beyond an end, or -1. */
 static void find_mate(int k, int end, double r) {
     Surface *s = W.surfaces + k;
     double place[2], onward[2], other[2], back[2], last;
@@ -149,8 +161,8 @@ static void find_mate(int k, int end, double r) {
         int m = W.ends[row] / 2;
         const Surface *next = W.surfaces + m;
         if (rank(W.ends[row]) > last) break;
-        if (m == k || m >= mate || (next->shape == SEGMENT && s->shape == SEGMENT && !W.outline_count)) continue;
-        if (next->mover != s->mover || (next->one_sided != s->one_sided)) continue;
+        if (m == k || m >= mate) continue;
+        if (!move_alike(s, next) || next->one_sided != s->one_sided) continue;
         at_end(next, W.ends[row] % 2, other, back);
         double off = hypot(other[0] - place[0], other[1] - place[1]);
         if (off > JOINED * r || hypot(back[0] + onward[0], back[1] + onward[1]) > SMOOTH) continue;
@@ -161,7 +173,7 @@ static void find_mate(int k, int end, double r) {
     for (int n = 0; n < W.circle_count; n++) {
         const Surface *next = W.surfaces + W.circles[n];
         double x = place[0] - next->x, y = place[1] - next->y, reach = next->radius + JOINED * r;
-        if (next->mover != s->mover || s->one_sided) continue;
+        if (!move_alike(s, next) || s->one_sided) continue;
         if (fabs(x) > reach || fabs(y) > reach) continue;
         double d = hypot(x, y), off = fabs(d - next->radius);
         if (off > JOINED * r || fabs(x * onward[0] + y * onward[1]) > SMOOTH * d) continue;
@@ -178,7 +190,7 @@ static void share_end(int k, int n, double near, double r) {
     for (int row = first_near(2 * k + n, r, &last); row < W.end_count; row++) {
         const double *other = W.surfaces[W.ends[row] / 2].end + 2 * (W.ends[row] % 2);
         if (rank(W.ends[row]) > last) break;
-        if (W.surfaces[W.ends[row] / 2].mover != W.surfaces[k].mover) continue;
+        if (!move_alike(W.surfaces + k, W.surfaces + W.ends[row] / 2)) continue;
         if (W.ends[row] < first && fabs(end[0] - other[0]) <= near && fabs(end[1] - other[1]) <= near)
             first = W.ends[row];
     }
@@ -210,7 +222,7 @@ static void find_crown(int k, int n, double r) {
         int end = W.ends[row] % 2;
         at_end(next, end, there, back);
         if (W.ends[row] == 2 * k + n || there[0] != place[0] || there[1] != place[1]) continue;
-        if (next->mover != s->mover || next->there == ABSENT) continue;
+        if (!move_alike(s, next) || next->there == ABSENT) continue;
         double left = back[0] * s->ty - back[1] * s->tx;
         if (s->shape == SEGMENT && fabs(left) > ALIKE) s->hollows[n] |= left > 0 ? 1 : 2;
         double bends = curl_of(next, end) - curl_of(s, n);
@@ -349,7 +361,7 @@ void find_crowns(void) {
         if (W.surfaces[k / 2].shape != CIRCLE && W.surfaces[k / 2].mover < 0) find_crown(k / 2, k % 2, least);
 }
 
-/* Find which pieces continue where another one ends. A moving piece is only joined to pieces with the same motion. */
+/* Find which pieces continue where another one ends. A moving piece is only joined to those that move alike. */
 void join_surfaces(void) {
     double least = least_radius();
     for (int k = 0; k < W.surface_count; k++) W.surfaces[k].mover = find_mover(W.surfaces + k);

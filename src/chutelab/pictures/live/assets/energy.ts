@@ -19,8 +19,8 @@ const KEPT: Record<string, string[]> = { spring: ["spring", "stiffness"], damper
 /** A residual below this part of the whole is rounding, and not shown. */
 const TINY_RESIDUAL = 1e-12;
 
-/** A work below this part of the whole, in a machine without drives, is not shown: what holds a hinge
- * does that much. */
+/** A work below this part of the whole, in a machine without drives, is not shown: what holds a
+ * hinge does that much. */
 const TINY_WORK = 1e-7;
 
 /** J; less is shown as 0. */

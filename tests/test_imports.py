@@ -137,6 +137,7 @@ OWN = {
     "core.h": "contact",
     "shape.h": "contact",
     "exact.h": "exact",
+    "exact_pieces.h": "exact",
     "laws.h": "laws",
     "plan.h": "machine",
 } | {"releases.h": "machine"}

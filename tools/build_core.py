@@ -46,8 +46,8 @@ FLAGS = (
 round as doubles do."""
 
 ONCE = (
-    "exact_pieces", "hand", "loads", "nominal", "plan", "prepare", "random",
-    "releases", "room",
+    "exact_cuts", "exact_joints", "exact_pieces", "hand", "loads", "nominal", "plan", "prepare",
+    "random", "releases", "room",
 )  # fmt: skip
 """Files that a run passes through once, or once an event: they are compiled for size, which leaves
 the page room and costs no time that can be measured."""

@@ -174,19 +174,21 @@ static inline Two larger(Two a, Two b) { return __builtin_wasm_pmax_f64x2(a, b);
 /* exact_pieces.c */
 int lay_obstacles(int member);
 void fit_obstacles(void);
-int is_there(int obstacle, int epoch);
-int epoch_at(double t);
 void own_ends(int epoch);
 /* The crown of an end in an epoch. */
 static inline const double *crown_of(const Obstacle *end, int epoch) {
     return O.crowns + 2 * (epoch * O.tip_count + O.tips[end->tips].spot);
 }
+
+/* exact_there.c */
+int face_of(int piece, int face);
+int epoch_at(double t);
+int is_there(int obstacle, int epoch);
 int is_shared(int set, int obstacle, int face);
 int has_edge(int set, int obstacle, int edge);
 int is_beside(int circle, int obstacle, int face);
 int corner_at(int obstacle, int side, double x, double y);
 int bounds(int corner, int obstacle, int side, int epoch);
-int face_of(int piece, int face);
 
 /* exact_meet.c */
 double descent(double gap, double rate, double acceleration);
@@ -194,6 +196,7 @@ double polynomial(const double *c, int count, double t);
 int spans(const Obstacle *o, double x, double y);
 int is_reached(int circle, double x, double y, int epoch);
 int first_contact(const Motion *m, double *until, int *obstacle, int *side);
+void find_bounds(int circle, int side, double phi, int epoch, Bound *found);
 
 /* exact_ride.c */
 /* Share of the radius by which the cubic Hermite curve between two knots may leave a circle: what the recording allows,
@@ -221,7 +224,6 @@ typedef struct { double dt, phi, up, across, w, z, work, heat, twist; int outcom
 #define MOST_KNOTS 32
 
 int advance_ride(const Circle *c, double longest, Ridden *end, Ridden *knots);
-void find_bounds(int circle, int side, double phi, int epoch, Bound *found);
 
 /* exact_pass.c */
 int pass_round(const Circle *c, double longest, Ridden *end, Ridden *knots);

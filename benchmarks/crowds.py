@@ -12,6 +12,9 @@ ENGINE is contact or pymunk, by default what `auto` takes. The cases, all by def
     board   the scene `galton`: 500 balls fall through 12 rows of pegs
     drum    1,000 in a drum whose rim runs, which never sleep, for 1 s
     boxes   only if asked for: 1,000 into each of twenty boxes 0.3 to 0.6 m wide, until they sleep
+    wide    only if asked for: 500, 1,000, 2,000 and 4,000 fall from 0.45 m into boxes of a width in
+            proportion, for 2 s; and the power of their number with which the time grows
+    deep    the same with boxes of the same width, from heights in proportion
 
 `stream` and `bed` run in turns with the bare loop, three times each; medians are told. The loop has
 the same solids and disks, each from its release on, carried by a belt that holds it, then free; it
@@ -22,7 +25,7 @@ disks that touch a surface (the loop's: of pairs).
 """
 
 import sys
-from math import acos, cos, inf, sin
+from math import acos, cos, inf, log, sin
 from pathlib import Path
 from statistics import median
 from time import process_time
@@ -82,6 +85,17 @@ DRUM = {
     "run": {"until": 1.0},
 }  # fmt: skip
 
+
+def falling(width, height, count):
+    """Return a scene: so many fall from places up to a height into a box, for 2 s."""
+    poured = box(width, count, 0.0)
+    stream = {name: poured["stream"][name] for name in ("count", "velocity", "interact")}
+    stream["fill"] = [[-0.5 * width + 0.005, 0.01], [0.5 * width - 0.005, height]]
+    stream |= {"restitution": 0.5, "friction": 0.3}
+    particle = poured["particle"] | {"spin": True}
+    return poured | {"particle": particle, "stream": stream, "run": {"until": 2.0}}
+
+
 LONG = ["stream.count=3200", "run.max_time=30"]
 BED = ["stream.count=1000", "particle.spin=true"]
 
@@ -99,6 +113,12 @@ BOXES = {
     f"{width:.4f} m": lambda width=width: scene.from_dict(box(width, 1000, 1.0))
     for width in np.linspace(0.3, 0.6, 20).tolist()
 }
+NUMBERS = (500, 1000, 2000, 4000)
+WIDE = {f"wide {n}": lambda n=n: scene.from_dict(falling(n / 2000.0, 0.45, n)) for n in NUMBERS}
+DEEP = {
+    f"deep {n}": lambda n=n: scene.from_dict(falling(0.5, n / 1000.0 * 0.45, n)) for n in NUMBERS
+}
+SEVERAL = {"boxes": BOXES, "wide": WIDE, "deep": DEEP}
 COMPARED = ("stream", "bed")
 
 
@@ -177,7 +197,8 @@ def told(depth):
 
 
 def measure(name, engine):
-    drawn = (CASES | BOXES)[name]()
+    """Print what a case takes, and return its seconds."""
+    drawn = (CASES | BOXES | WIDE | DEEP)[name]()
     machine = build(drawn)
     ours, theirs, compared = [], [], name in COMPARED
     for _ in range(REPEATS if compared else 1):
@@ -191,27 +212,30 @@ def measure(name, engine):
     pairs, walls = overlaps(recording, times), inside_surfaces(recording, machine, times)
     residual = ledger(recording).relative_residual
     print(
-        f"{name:8} {recording.engine:8} {recording.count:6} {end:7.2f} {median(ours):8.2f}"
+        f"{name:9} {recording.engine:8} {recording.count:6} {end:7.2f} {median(ours):8.2f}"
         f" {told(pairs)} {told(walls)} {residual:9.1e}"
     )
     if compared:
         depth = bare(machine, end, looks=True)[1]
         print(
-            f"{'':8} {'bare':8} {recording.count:6} {end:7.2f} {median(theirs):8.2f} {told(depth)}"
+            f"{'':9} {'bare':8} {recording.count:6} {end:7.2f} {median(theirs):8.2f} {told(depth)}"
         )
-        print(f"{'':8} ratio {median(ours) / median(theirs):.2f}")
+        print(f"{'':9} ratio {median(ours) / median(theirs):.2f}")
+    return median(ours)
 
 
 def main(arguments):
     engine = arguments.pop(0) if arguments and arguments[0] in ENGINES else None
-    print(f"{'':32} {'':8} {'pairs, % of r':>15} {'surfaces, % of r':>17}")
+    print(f"{'':33} {'':8} {'pairs, % of r':>15} {'surfaces, % of r':>17}")
     print(
-        f"{'case':8} {'engine':8} {'disks':>6} {'until s':>7} {'CPU s':>8} {'worst':>7} {'99 %':>7}"
+        f"{'case':9} {'engine':8} {'disks':>6} {'until s':>7} {'CPU s':>8} {'worst':>7} {'99 %':>7}"
         f" {'worst':>7} {'99 %':>7} {'residual':>9}"
     )
     for name in arguments or CASES:
-        for one in BOXES if name == "boxes" else [name]:
-            measure(one, engine)
+        seconds = [measure(one, engine) for one in SEVERAL.get(name, [name])]
+        if name in ("wide", "deep"):
+            power = log(seconds[-1] / seconds[0]) / log(NUMBERS[-1] / NUMBERS[0])
+            print(f"{name:9} seconds grow with the number to the power of {power:.2f}")
 
 
 if __name__ == "__main__":

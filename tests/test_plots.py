@@ -411,5 +411,5 @@ def test_where_a_potential_energy_is_read_its_zero_is_told():
     legend = [text.get_text() for text in plots.overlay(run).findobj(Text)]
     assert "potential, from the\nlowest place reached" in legend
     said = " ".join(str(run.ledger).split())
-    told = re.search(r"potential (\S+) -> (\S+) J; heights from the origin", said)
+    told = re.search(r"potential above the origin (\S+) -> (\S+) J", said)
     assert [float(told[n]) for n in (1, 2)] == pytest.approx(weight * y[[0, -1]], rel=1e-5)

@@ -107,7 +107,7 @@ class Ledger(Shown):
             f"residual {self.residual:.1e} J, {share:.1e} of the {number(self.turned_over)} J"
             " turned over"
             if details
-            else f"share of these energies that the ledger cannot explain: {100.0 * share:.3f} %"
+            else f"energy that the ledger cannot explain: {100.0 * share:.3f} %"
         )
 
         def told(entry: float, share: float = ROUNDING) -> str:
@@ -139,7 +139,7 @@ class Ledger(Shown):
                 rows.append([*row(f"of {name}", losses), told(own["belt_work"])])
         else:
             rows += [row(f"of {name}", own) for name, own in self.by_stream.items()]
-        kept = {"kinetic": self.kinetic, "potential": self.potential}
+        kept = {"kinetic": self.kinetic, "potential above the origin": self.potential}
         kept |= {"spring": self.spring} if any(self.spring) else {}
         moved = (
             f"{name} {told(before, UNSEEN)} -> {told(after, UNSEEN)} J"
@@ -150,7 +150,7 @@ class Ledger(Shown):
             ("", *heads),
             tuple(map(tuple, rows)),
             foot=(tuple(total),),
-            notes=(f"{', '.join(moved)}; heights from the origin", left),
+            notes=(", ".join(moved), left),
         )
 
 

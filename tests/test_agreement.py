@@ -270,10 +270,10 @@ def test_a_wrong_number_is_caught_from_outside(wrong, until, monkeypatch):
     [
         ("exact_meet.c", "span / -acceleration : (gap + gap) / span;",
          "span / -acceleration : (1.0 + 1e-6) * (gap + gap) / span;"),
-        ("exact.c", "double rebound = c.restitution * approach;",
+        ("exact_contact.c", "double rebound = c.restitution * approach;",
          "double rebound = (1.0 + 1e-6) * c.restitution * approach;"),
         # The printed Eq. (9) in an engine: the wrong component is damped.
-        ("exact.c", "push = limited(-A.share * slip, grip);",
+        ("exact_contact.c", "push = limited(-A.share * slip, grip);",
          "push = -(1.0 - c->restitution) * slip;"),
     ],
 )  # fmt: skip

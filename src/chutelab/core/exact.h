@@ -171,6 +171,38 @@ static inline Two two_at(const double *place) { return *(const Two *)place; }
 static inline Two lesser(Two a, Two b) { return __builtin_wasm_pmin_f64x2(a, b); }
 static inline Two larger(Two a, Two b) { return __builtin_wasm_pmax_f64x2(a, b); }
 
+/* exact.c */
+extern int course; /* result of a round, see `enum Course` */
+
+/* exact_record.c */
+void write_knot_of(int inner);
+void write_knot(void);
+void record_event(int kind, int surface);
+void tell_here(void);
+void bear_since(int surface, double nx, double ny, double depth);
+void bear_round(int surface, double x, double y, double rho, double depth);
+void bear_at(const Touch *c);
+void record_entries(int surface, double work, double restitution, double friction);
+void end_track(int reason);
+void part_from(int surface);
+void let_go(int left, int side, int order, int joint);
+
+/* exact_contact.c */
+int epoch_now(void);
+double next_change(void);
+double vanishes(int obstacle);
+Touch touch_now(void);
+double along(const Touch *c);
+double surface_spin(int obstacle);
+void snap(int obstacle, int side);
+int is_pressed(const Touch *c);
+void end_roll(void);
+void end_slip(void);
+double face_force(const Touch *c, double *force, double *couple);
+void look_round(void);
+void strike(int obstacle, int side);
+void pass_on(int obstacle, int side, int joint);
+
 /* exact_pieces.c */
 int lay_obstacles(int member);
 void fit_obstacles(void);

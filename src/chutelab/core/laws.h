@@ -37,10 +37,50 @@ static inline long member_of(int i) { return L.each ? i / L.each : 0; }
 /* A knot by its number. */
 #define KNOT(k) (L.knots + (long)(k) * L.row)
 
+/* Knots that break a law, found in the order of particles. */
+typedef struct { int particles, particle, latest, knot; } Group;
+
+/* Sums over all particles, and the largest and least values of one. `lightness` sums 1 / mass. `size` is of pieces: the
+   largest coordinate and length of segments, coordinate and radius of arcs; `belts` their largest speed. `whirl` is the
+   largest speed of a corner by rotation, m/s; `reach` the largest coordinate or length of anything, m. For particles that
+   do not meet also the energy that is unexplained at their ends, J, its largest change between two knots, and the least
+   value of `given_back`. */
+struct Sums {
+    double mass, lightness, weight, heaviest, smallest, gravity, size[4], belts;
+    double t, knot_t, place, reach, fastest, whirl, lifted, entries[3], residual, change, back;
+    Group bad;
+    int unreal;
+};
+
+extern struct Sums All;
+
+static inline int last_of(int i) { return L.offsets[i + 1] - 1; }
+
+static inline int is_released(int i) { return L.offsets[i + 1] > L.offsets[i]; }
+
+static inline double speed_squared(const double *knot) { return square(knot[3]) + square(knot[4]); }
+
 /* laws.c */
+Breach *tell(int law, double amount, double bound);
+void add(Group *group, int i, int knot);
+void tell_group(int law, const Group *group, double amount, double bound);
 int judge(void);
 int judge_some(int end);
 int judge_rest(void);
+
+/* allowed.c */
+double unexplained(int i, const double *knot);
+double given_back(const double *now);
+void scan_machine(void);
+int scan_track(int i);
+int are_finite(void);
+void find_allowed(double bent);
+double longest_step(void);
+void find_limits(void);
+
+/* energy.c */
+int is_even(double most);
+void judge_books(double bound);
 
 /* barriers.c */
 void shape_barriers(void);

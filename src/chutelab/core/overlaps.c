@@ -41,8 +41,6 @@ static double state_at(int k, double t, double *state) {
     return s;
 }
 
-static int last_of(int i) { return L.offsets[i + 1] - 1; }
-
 /* Greatest speed of a corner by rotation in the time after a knot, m/s. */
 static double whirl_after(const Body *body, int k) {
     const double *knot = KNOT(k), *next = knot + L.row;

@@ -1,7 +1,7 @@
 """The laws by which every run is judged at its end: those that cost little.
 
 They use the recording and the places of the machine's surfaces, and share nothing with the engines.
-The core finds broken laws (laws.c, barriers.c); the words are here. `Recording.laws` is the result;
+The core finds broken laws (laws.c and what it calls); the words are here. `Recording.laws` is the result;
 `chutelab stress` has more laws, which take longer.
 """
 

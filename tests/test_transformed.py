@@ -406,6 +406,6 @@ def test_a_fault_in_one_draw_of_twenty_is_told(with_fault):
     arm = "c->arm = pair->rolling * reach"
     with_fault("contact.c", f"{arm};", f"{arm} * (1 + 1e-6 * c->nx);")
     drawn.cache_clear()
-    with pytest.raises(AssertionError, match="assert 2 <="):
+    with pytest.raises(AssertionError, match=r"assert [23] <="):
         check("oddities", "mirrored", range(40))
     drawn.cache_clear()

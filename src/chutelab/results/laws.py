@@ -1,8 +1,8 @@
 """The laws by which every run is judged at its end: those that cost little.
 
 They use the recording and the places of the machine's surfaces, and share nothing with the engines.
-The core finds broken laws (laws.c and what it calls); the words are here. `Recording.laws` is the result;
-`chutelab stress` has more laws, which take longer.
+The core finds broken laws (laws.c and what it calls); the words are here. `Recording.laws` is the
+result; `chutelab stress` has more laws, which take longer.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 /* The laws by which every run is judged, in their order, and what is told of each that it breaks. Those about places are in
-   barriers.c and overlaps.c, those about energy in energy.c, and what they allow is in allowed.c.
+   hits.c and overlaps.c, those about energy in energy.c, and what they allow is in allowed.c.
 
    A check shares nothing with what it checks: nothing here is from the engine's files. */
 

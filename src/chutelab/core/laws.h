@@ -87,8 +87,11 @@ void shape_barriers(void);
 double beside(const Barrier *b, double x, double y);
 int is_within(const Barrier *b, double x, double y, double margin);
 double distance(const Barrier *b, double x, double y);
+const Barrier *nearest(const Barrier *b, double x, double y, double *gap, double *off);
 void to_rest(const Barrier *b, double t, double *x, double *y);
 double swiftest(const Barrier *b, double *haste);
+
+/* hits.c */
 void place_at(const double *knot, double share, double *x, double *y);
 double angle_at(int knot, double share);
 int find_hits(int particle);

@@ -2,7 +2,7 @@
 
 Nearest point, gap, normal, ends, box, and the path to draw it: for drawing machines, describing
 their parts, and checking runs. Engines must not use it to find a contact, nor the core to judge a
-run (`barriers.c`): each has its own detection, so that none of them, nor a check that uses this
+run (`hits.c`): each has its own detection, so that none of them, nor a check that uses this
 module, repeats another's mistake.
 
 Arrays of S pieces are (S,), and vectors (S, 2), in a family (N, S) and (N, S, 2); `Pieces.of` picks

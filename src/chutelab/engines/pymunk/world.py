@@ -123,7 +123,8 @@ class Ends:
         angle of more than π between two; all of that rim continues the faces of both.
         """
         near = self.at(end)
-        if len(near) == 1:
+        # Alone there; or the piece itself is not, and nothing touches its rim.
+        if len(near) < 2:
             return out.perpendicular()
         ways, bends = np.array([one.way for one in near]), np.array([one.bend for one in near])
         dots, crosses = ways @ -np.array(out), ways[:, 0] * out.y - ways[:, 1] * out.x

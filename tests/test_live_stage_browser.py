@@ -65,6 +65,18 @@ def test_a_plate_is_moved_by_its_body_and_a_line_keeps_its_shape(shown):
     assert np.array_equal(page.evaluate("chutelab.lab.scene.surface[0].points"), before)
 
 
+@pytest.mark.slow
+def test_the_first_view_has_both_pulleys_of_the_belt(page_of):
+    """Where both are large: the other one is as large as that which drives."""
+    page = page_of(12)
+    left = """() => {
+      const { segments: [belt], pulley } = chutelab.lab.machine;
+      return [belt.x - pulley.radius, belt.y];
+    }"""
+    x, _ = page.evaluate(SCREEN, page.evaluate(left))
+    assert x >= page.locator("#stage").bounding_box()["x"]
+
+
 def frame(page):
     """The frame round what is chosen, on the screen; None without one."""
     box = page.locator("#stage").bounding_box()

@@ -192,6 +192,12 @@ function boxOf(
   for (const [x, y] of machine.segments.filter(({ speed }) => speed).flatMap(ends)) {
     widen(isFinite(left) ? Math.min(Math.max(x, left), right) : x, y);
   }
+  // Where the beginning of the incoming belt is shown, its pulley is.
+  const { radius = 0, surface = -1 } = machine.pulley ?? {};
+  const belt = machine.segments.find((one) => radius && one.surface === surface);
+  if (belt && belt.x >= box.left) {
+    widen(belt.x + radius * belt.ty, belt.y - radius * belt.tx, radius);
+  }
   for (const place of swept) widen(...place);
   if (!isFinite(box.left)) return EMPTY;
   // Below a surface that vanishes, or swings away, show where particles fall.

@@ -336,7 +336,7 @@ def test_steps_do_not_depend_on_how_a_surface_that_turns_is_written():
 
 @pytest.mark.parametrize("kink", [-0.004, 0.004, 0.009])
 def test_a_box_far_away_does_not_change_what_a_disk_slides_over(kink):
-    """Pieces at less than 0.01 rad count as smooth for all; before, only where a box was."""
+    """Bends below 0.01 rad counted as smooth where a box was, even far away."""
     turns = kink * np.arange(10)
     steps = 0.1 * np.array([np.cos(turns), np.sin(turns)]).T
     points = np.vstack([[-1.0, 0.0], np.cumsum(steps, axis=0) - [1.0, 0.0]]).tolist()

@@ -7,8 +7,10 @@
 /* rad, and share of a curvature; smaller differences of directions, or of curvatures, count as none. */
 #define ALIKE 1e-9
 
-/* Pieces join smoothly if their ends are no further apart than JOINED radii and their directions there differ by at most
-   SMOOTH (rad): points of a scene are written with few digits. */
+/* Pieces that end at one point join smoothly if their directions there differ by at most IN_LINE (rad): a larger bend is
+   one, and no step removes the error of passing it smoothly. Ends that are apart, by up to JOINED radii, are meant as one
+   point and written with few digits; so may their directions be, up to SMOOTH. */
+#define IN_LINE 1e-6
 #define JOINED 1e-3
 #define SMOOTH 1e-2
 
@@ -148,6 +150,11 @@ static int move_alike(const Surface *s, const Surface *next) {
         && a->way[0] == b->way[0] && a->way[1] == b->way[1] && a->from == b->from && a->lasts == b->lasts;
 }
 
+/* Whether two ends that are so far apart (m) and bend by so much (rad) join smoothly. */
+static int is_smooth(double off, double bend, double r) {
+    return off <= JOINED * r && bend <= (off > ALIKE * r ? SMOOTH : IN_LINE);
+}
+
 /* Set which piece continues smoothly beyond an end, or -1. */
 static void find_mate(int k, int end, double r) {
     Surface *s = W.surfaces + k;
@@ -165,7 +172,7 @@ static void find_mate(int k, int end, double r) {
         if (!move_alike(s, next) || next->one_sided != s->one_sided) continue;
         at_end(next, W.ends[row] % 2, other, back);
         double off = hypot(other[0] - place[0], other[1] - place[1]);
-        if (off > JOINED * r || hypot(back[0] + onward[0], back[1] + onward[1]) > SMOOTH) continue;
+        if (!is_smooth(off, hypot(back[0] + onward[0], back[1] + onward[1]), r)) continue;
         s->mates[end] = mate = m;
         s->ledges[end] = off;
     }
@@ -176,7 +183,7 @@ static void find_mate(int k, int end, double r) {
         if (!move_alike(s, next) || s->one_sided) continue;
         if (fabs(x) > reach || fabs(y) > reach) continue;
         double d = hypot(x, y), off = fabs(d - next->radius);
-        if (off > JOINED * r || fabs(x * onward[0] + y * onward[1]) > SMOOTH * d) continue;
+        if (!is_smooth(off, fabs(x * onward[0] + y * onward[1]) / d, r)) continue;
         s->mates[end] = W.circles[n];
         s->ledges[end] = off;
         return;

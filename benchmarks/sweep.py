@@ -29,6 +29,7 @@ FAMILIES = (
     ("spoon", "plate.angle_deg", -5.0, 20.0),
     ("spoon", "plate.restitution", 0.0, 0.5),
     ("spoon", "surface.spoon.friction", 0.0, 0.5),
+    ("spoon", "surface.spoon.radius", 0.49, 0.51),
     ("slip", "incoming.friction", 0.3, 1.0),
 )
 

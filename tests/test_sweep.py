@@ -19,13 +19,11 @@ from chutelab.results import Kind, Recording
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import compare
 from chutelab.results.recorder import Recorder
-from chutelab.scene import load, parse
+from chutelab.scene import SceneError, load, parse
+from chutelab.scene.conflicts import Row
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import with_unit
-from chutelab.scene.variants import (
-    Family,
-    Vary,
-)
+from chutelab.scene.variants import Family, Judge, Vary
 from chutelab.studies.sweep import (
     COLUMNS,
     MOST_VARIANTS,
@@ -379,6 +377,37 @@ def test_a_variant_that_cannot_be_or_misses_is_a_row_with_its_reason():
     assert swept.columns["misses"][missed] == 1.0
     assert np.isnan(swept.columns["landing.x.mean"][missed])
     assert swept.columns["ledger.restitution_loss"][missed] > 0.0
+
+
+@pytest.mark.parametrize(("scene", "settings", "values"), [
+    ("spoon", (), {"surface[0].from_deg": (180.0, 265.0, -95.0, -95.5, 265.0, 180.0)}),
+    ("spoon", ("surface.spoon.to_deg=200",), {"surface[0].radius": (0.5, 1e-9, 0.4, 1e-9, 0.6)}),
+    ("spoon", ("surface.spoon.opens_at=1",), {"surface[0].closes_at": (2.0, 1.0, 0.5, 1.0)}),
+    ("spoon", ("run.until=1.5",), {"stream.start": (0, 1.5, 1.4, 2), "gravity": (9.8, 1, 0, 2)}),
+    ("spoon", ("stream.width=0.014",), {"particle.radius": (0.004, 0.008, 0.007, 0.0, 0.003)}),
+    ("spoon", (), {"plate.above": (0, 1, 0, 0), "plate.below": (0, 0, 1, 0)}),
+    ("cascade", (), {"conveyor[0].to[0]": (1.2, -0.2, 1.0)}),
+])  # fmt: skip
+def test_variants_are_refused_as_their_scenes_are_by_the_rules_that_read_what_varies(
+    scene, settings, values, monkeypatch
+):
+    base, told, cost = load(scene, settings), [], []
+    judge, read, count = Judge(base), Row.__getitem__, []
+    monkeypatch.setattr(Row, "__getitem__", lambda row, key: count.append(key) or read(row, key))
+    for row in zip(*values.values(), strict=True):
+        own = dict(zip(values, row, strict=True))
+        count.clear()
+        found = judge.finds(own)
+        cost.append(len(count))
+        try:
+            base.with_values(own)
+            told.append((found, False))
+        except SceneError:
+            told.append((found, True))
+    assert all(found == is_faulty for found, is_faulty in told)
+    assert {found for found, _ in told} == {False, True}
+    # All rules once, then those alone that read a key that varies.
+    assert max(cost[1:]) < 0.4 * cost[0], cost
 
 
 def test_a_run_that_gets_stuck_is_a_row(monkeypatch):

@@ -14,7 +14,7 @@ import math
 import tomllib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
 from types import CodeType
@@ -254,6 +254,12 @@ class Look:
         return self._rows[table] or [Row(self, table, number) for number in range(least)]
 
     @property
+    def gravity(self) -> Any:
+        """The scene's gravity, valid or not; None if it is not written."""
+        self.asked.add("gravity")
+        return self.document.get("gravity")
+
+    @property
     def damps(self) -> bool:
         """Whether there is a damping plate."""
         return any(plate.given("distance") for plate in self.rows("plate"))
@@ -286,10 +292,18 @@ class _Names(dict[str, Any]):
         return self.other(name)
 
 
-def contradictions(
-    look: Look, table: str, rows: Sequence[Row], kinds: Sequence[Row] = (), count: float = math.nan
-) -> Iterator[Fault]:
-    """Yield the faults that `RULES` find in rows of a table."""
+Check = Callable[[], Iterator[Fault]]
+"""Yields the faults of one rule; what it reads is not read before it is called."""
+
+
+def rules_of(
+    look: Look,
+    table: str,
+    rows: Sequence[Row],
+    kinds: Sequence[Row] = (),
+    streams: Sequence[Row] = (),
+) -> Iterator[Check]:
+    """Yield a check for each of `RULES` in each row of a table."""
     run = look.row("run")
 
     def near(a: object, b: object) -> bool:
@@ -301,46 +315,70 @@ def contradictions(
         earlier, kind = rows[:number], row
         if table == "stream":
             kind = next((one for one in kinds if one["name"] == row["particle"]), kinds[0])
+
+        def other(name: str, row: Row = row) -> Any:
+            if name == "count":
+                return sum(stream["count"] for stream in streams)
+            return look.gravity if name == "gravity" else row[name]
+
         names = _Names(
-            row.__getitem__, abs=abs, radians=math.radians, near=near, run=run, has=look.has,
+            other, abs=abs, radians=math.radians, near=near, run=run, has=look.has,
             number=lambda value: isinstance(value, int | float), given=row.given, sound=row.sound,
             before=lambda key, rows=earlier: any(one.given(key) for one in rows),
-            value=row.__getitem__, gravity=look.document.get("gravity"), count=count, kind=kind,
+            value=row.__getitem__, kind=kind,
         )  # fmt: skip
-        for keys, when, _, said in RULES[table]:
-            for key in keys.split():
-                names["key"] = key
-                if eval(compiled(when), {"__builtins__": {}}, names) and (
-                    row.given(key) or row.sound(key)
-                ):
-                    of = _Names(kind.path)
-                    words = _Names(row.path, its=row, run=run, count=count, kind=kind, of=of)
-                    text = said.format_map(words)
-                    value = row[key]
-                    yield Fault(row.path(key), MISSING if value is None else value, text)
+        for rule in RULES[table]:
+            yield partial(_contradictions, row, names, rule)
+
+
+def _contradictions(row: Row, names: _Names, rule: Sequence[str]) -> Iterator[Fault]:
+    """Yield the faults that one of `RULES` finds in a row."""
+    keys, when, _, said = rule
+    for key in keys.split():
+        names["key"] = key
+        if eval(compiled(when), {"__builtins__": {}}, names) and (row.given(key) or row.sound(key)):
+            run, kind = names["run"], names["kind"]
+            of = _Names(kind.path)
+            words = _Names(row.path, its=row, run=run, count=names["count"], kind=kind, of=of)
+            text = said.format_map(words)
+            value = row[key]
+            yield Fault(row.path(key), MISSING if value is None else value, text)
+
+
+def checks(look: Look) -> Iterator[Check]:
+    """Yield all checks, in order. Which there are does not depend on numbers in the tables."""
+    kinds, streams = look.rows("particle", 1), look.rows("stream", 1)
+    yield partial(_tables, look)
+    yield partial(_names, look)
+    yield partial(_references, look)
+    for kind in kinds:
+        yield partial(_mass, look, kind)
+    yield partial(_engine, look, kinds, streams)
+    for stream in streams:
+        yield partial(_width, stream, kinds)
+    for table in RULES:
+        rows = look.rows(table, int(table in ALWAYS))
+        yield from rules_of(look, table, rows, kinds, streams)
+    yield partial(_pieces, look)
+    yield partial(_strings, look)
+    yield partial(_expectations, look, streams)
+    yield partial(_view, look)
 
 
 def conflicts(look: Look) -> Iterator[Fault]:
     """Yield every conflict between keys; each names all the keys concerned."""
-    kinds, streams = look.rows("particle", 1), look.rows("stream", 1)
-    yield from _tables(look)
-    yield from _names(look)
-    yield from _references(look)
-    for kind in kinds:
-        yield from _mass(look, kind)
-    yield from _engine(look, kinds, streams)
-    for stream in streams:
-        yield from _width(stream, kinds)
-    count = sum(stream["count"] for stream in streams)
-    for table in RULES:
-        rows = look.rows(table, int(table in ALWAYS))
-        yield from contradictions(look, table, rows, kinds, count)
-    yield from _pieces(look)
+    for check in checks(look):
+        yield from check()
+
+
+def _strings(look: Look) -> Iterator[Fault]:
     for joint in look.rows("string"):
         if joint.given("over") and look.row("run")["engine"] == "pymunk":
             text = f"{joint.path('over')} needs contact: Chipmunk has no string over a pulley"
             yield look.row("run").fault("engine", text)
-    yield from _expectations(look, streams)
+
+
+def _view(look: Look) -> Iterator[Fault]:
     view = look.row("view")
     low, high = view["from"], view["to"]
     corners = isinstance(low, LIST) and isinstance(high, LIST)

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from chutelab.scene.conflicts import UNPROMISED, ConflictError, Look, contradictions
+from chutelab.scene.conflicts import UNPROMISED, ConflictError, Look, rules_of
 from chutelab.scene.units import (
     LARGEST,
     MOST_PARTICLES,
@@ -296,7 +296,8 @@ class Surface(Moving, StillSurface):
         given = {name.rstrip("_"): getattr(self, name) for name in self.model_fields_set}
         defaults = {name.rstrip("_"): field.default for name, field in Surface.model_fields.items()}
         look = Look({"surface": given}, {"surface": defaults, "run": {}})
-        if faults := list(contradictions(look, "surface", [look.row("surface")])):
+        rules = rules_of(look, "surface", [look.row("surface")])
+        if faults := [fault for check in rules for fault in check()]:
             raise ConflictError(faults)
         if self.from_ is not None:
             self._fill("points", (self.from_, self.to))

@@ -8,14 +8,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, reduce
 from math import inf, isfinite, nan, prod
+from operator import getitem
 from typing import Any, Final
 
 import numpy as np
 
 from chutelab.scene import Scene, SceneError, from_dict, plain, to_dict
-from chutelab.scene.conflicts import EITHER, NO_MACHINE, Look, conflicts
+from chutelab.scene.conflicts import EITHER, NO_MACHINE, Check, Look, checks
 from chutelab.scene.materials import Material, Particle
 from chutelab.scene.overrides import (
     Override,
@@ -251,24 +252,54 @@ def accepted(path: str, values: Floats) -> Bools:
 class Judge:
     """Finds scenes that contradict themselves, among variants whose keys are valid by themselves.
 
-    Expectations do not concern varied numbers, so they are left out.
+    Expectations do not concern varied numbers, so they are left out. A check that reads none of the
+    varied keys finds the same in all variants, and is made once.
     """
 
     def __init__(self, scene: Scene) -> None:
         self._document = plain(to_dict(scene)) | {"expect": []}
-        self.asked: set[str] = set()
+        self._places: dict[str, tuple[Any, Any]] = {}
+        self._telling: list[Check] = []
+        self._always = False
+        self.look: Look | None = None
+
+    def reads(self, path: str) -> bool:
+        """Whether the value of a key decided a result; others have no effect."""
+        # A rule uses a whole point, of which one coordinate may vary.
+        asked = () if self.look is None else self.look.asked
+        return any(f"{path}[".startswith(f"{key}[") for key in asked)
 
     def finds(self, values: Mapping[str, float]) -> bool:
         """Whether the scene with some values, by full path, has a fault.
 
-        Each call takes all keys that vary. `asked` has the keys whose values decided the result;
-        others have no effect.
+        Each call takes all keys that vary.
         """
-        apply(self._document, [Override(key, value) for key, value in values.items()])
-        look = Look(self._document, DEFAULTS)
-        found = any([*conflicts(look)])
-        self.asked |= look.asked
-        return found
+        if self.look is None:
+            self._begin(values)
+        for path, value in values.items():
+            table, key = self._places[path]
+            table[key] = value
+        # All are made: what one reads is told by `reads`.
+        faults = [fault for check in self._telling for fault in check()]
+        return self._always or bool(faults)
+
+    def _begin(self, values: Mapping[str, float]) -> None:
+        """Write all keys that vary, and find which checks read them."""
+        apply(self._document, [Override(path, value) for path, value in values.items()])
+        for path in values:
+            *way, key = resolved(self._document, path)
+            self._places[path] = reduce(getitem, way, self._document), key
+        self.look = Look(self._document, DEFAULTS)
+        asked = set[str]()
+        for check in checks(self.look):
+            self.look.asked = set()
+            found = any([*check()])
+            asked |= self.look.asked
+            if any(map(self.reads, values)):
+                self._telling.append(check)
+            else:
+                self._always |= found
+        self.look.asked = asked
 
 
 @dataclass(frozen=True, eq=False)

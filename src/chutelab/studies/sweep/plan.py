@@ -96,10 +96,7 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
             np.hstack([telling, good]), axis=0, return_index=True, return_inverse=True
         )
         fair = [sound[row] and not judge.finds(block.settings(row)) for row in first.tolist()]
-        # A rule uses a whole point, of which one coordinate may vary.
-        more = [
-            any(f"{path}[".startswith(f"{key}[") for key in judge.asked) for path in block.paths
-        ]
+        more = [*map(judge.reads, block.paths)]
         if not np.any(more & ~asked):
             break
         asked |= more

@@ -258,7 +258,7 @@ double find_blow(Contact *list, int count, double size, int joined, double (*u)[
         find_matrix(list, count, size, joined);
         lost = solve_with_energy(list, count, wanted, u);
         int lets_go = joined && let_go_again();
-        again = lets_go || hold_hinge(list, count, u, back);
+        again = lets_go || hold_hinge(list, count);
         for (int n = 0; n < count && again; n++) {
             double *J = list[n].impulse, none[3] = {-J[0], -J[1], -J[2]};
             if (lets_go) push(list + n, none);

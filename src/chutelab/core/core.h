@@ -299,7 +299,7 @@ void push_hinge(const Contact *c, const double *J);
 double hinge_share(const Contact *c);
 void strike_hinge(int mover, double t);
 void leave_struck(int mover);
-int hold_hinge(Contact *list, int count, double (*u)[3], double *back);
+int hold_hinge(Contact *list, int count);
 void stop_hinges(double t);
 void go_on(void);
 

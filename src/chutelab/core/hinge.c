@@ -180,6 +180,8 @@ void begin_hinges(double t, double h) {
         follow_path(m, h, &angle, &rate, &change);
         for (int n = 0; n < 2; n++) {
             int touches = n ? m->angle >= m->stops[1] - AGAINST : m->angle <= m->stops[0] + AGAINST;
+            /* If the step before ended early, it may be amid a hop. */
+            touches |= m->impulse[n] != 0 || m->lies == n + 1;
             /* As with joints, a short step corrects only as small a share of what is beyond the stop. */
             double beyond = n ? MAX(m->angle - m->stops[n], 0) : MIN(m->angle - m->stops[n], 0);
             double least = m->stops[n] + beyond * (1 - MIN(h / W.usual, 1));
@@ -187,6 +189,7 @@ void begin_hinges(double t, double h) {
             m->impulse[n] *= touches ? share : 0;
         }
         m->impulse[2] = MIN(MAX(share * m->impulse[2], -m->most), m->most);
+        m->lies = 0;
     }
 }
 
@@ -201,9 +204,15 @@ static void book_hinge(Mover *m, double f, double sign) {
     m->stopped -= sign * work(m, m->impulse[0] + m->impulse[1], f);
 }
 
+/* Let the stop on which a hinge lies take its angular velocity, without restitution. */
+static void rest_on_stop(Mover *m) {
+    m->stopped += 0.5 * m->inertia * square(m->rate);
+    m->rate = 0;
+}
+
 /* Set a hinge to where it is at t, when it is struck: the step ends there. If a stop held it in this step, its motion is
-   a hop: it lies on the stop. So it does if a step would not take it away from there: a hinge at rest on its stop has an
-   angular velocity by rounding. */
+   a hop: it lies on the stop, at rest. So it does if a step would not take it away from there: a hinge at rest on its stop
+   has an angular velocity by rounding. */
 void strike_hinge(int mover, double t) {
     Mover *m = W.movers + mover;
     double slow = AGAINST / W.usual;
@@ -214,6 +223,10 @@ void strike_hinge(int mover, double t) {
     }
     if (!m->lies && m->angle <= m->stops[0] + AGAINST && m->rate <= slow) m->lies = 1;
     if (!m->lies && m->angle >= m->stops[1] - AGAINST && m->rate >= -slow) m->lies = 2;
+    if (m->lies) {
+        rest_on_stop(m);
+        lay_path(m);
+    }
     m->solved = 0;
     m->before = m->rate;
     W.step_end = MIN(W.step_end, t);
@@ -316,7 +329,7 @@ double meet_stops(double t, double end) {
             double side = n ? 1 : -1, stop = m->stops[n], h = end - t, angle, rate, change;
             follow_path(m, h, &angle, &rate, &change);
             if (fabs(stop) == INFINITY || side * (angle - stop) <= 0) continue;
-            if (side * (m->angle - stop) >= -AGAINST) continue;
+            if (side * (m->angle - stop) >= -AGAINST || m->impulse[n] != 0) continue;
             double low = 0, high = h;
             for (int k = 0; k < 200 && high > low; k++) {
                 double next = side * rate > 0 ? h - (angle - stop) / rate : low;
@@ -420,12 +433,6 @@ EXPORT void turn_hinge(int owner, double torque) {
     }
 }
 
-/* Let the stop on which a hinge lies take its angular velocity, without restitution. */
-static void rest_on_stop(Mover *m) {
-    m->stopped += 0.5 * m->inertia * square(m->rate);
-    m->rate = 0;
-}
-
 /* Begin a path after an impact has changed a hinge's angular velocity. If it turns against the stop on which it lies, the
    stop takes that. */
 void leave_struck(int mover) {
@@ -437,33 +444,20 @@ void leave_struck(int mover) {
 }
 
 /* If an impact presses a hinge against the stop on which it lies, the hinge stands like a fixed surface. Return whether
-   it does, for the impulses that are in the list. Then the hinge is at rest, its levers are 0, and `u` and `back` are the
-   velocities before, and those asked for afterwards, without its motion. If nothing approaches without that motion, which
-   was a hop, the answer is no. */
-int hold_hinge(Contact *list, int count, double (*u)[3], double *back) {
+   it does, for the impulses that are in the list. Then its levers are 0. */
+int hold_hinge(Contact *list, int count) {
     Mover *m = list->hung ? hinge_of(list) : 0;
     double moment = 0;
-    int comes = 0;
-    for (int n = 0; n < count && m && m->lies; n++) {
-        moment -= moment_of(list + n, list[n].impulse);
-        comes |= u[n][0] + list[n].lever[0] * m->before <= 0;
-    }
-    if (!comes || !(m->lies == 2 ? moment > 0 : moment < 0)) return 0;
+    for (int n = 0; n < count && m && m->lies; n++) moment -= moment_of(list + n, list[n].impulse);
+    if (!(m && m->lies == 2 ? moment > 0 : moment < 0)) return 0;
     for (int n = 0; n < count; n++) {
         Contact *c = list + n;
         const Disk *d = W.disks + c->i;
-        double was = u[n][0];
-        for (int k = 0; k < 3; k++) {
-            u[n][k] += c->lever[k] * m->before;
-            c->other[k] -= c->moved[k];
-            c->moved[k] = c->lever[k] = 0;
-        }
-        if (was < 0) back[n] *= MIN(u[n][0], 0) / was;
+        for (int k = 0; k < 3; k++) c->lever[k] = 0;
         c->mass[0] = d->mass;
         c->mass[1] = 1 / (d->inv_mass + square(d->radius) * d->inv_inertia);
         c->mass[2] = d->inertia;
     }
-    m->rate = m->before;
-    rest_on_stop(m);
+    m->rate = 0;
     return 1;
 }

@@ -362,7 +362,7 @@ static void support(int i, int k, double t) {
     if (normal <= 0) return;
     c.impulse[0] = normal;
     c.impulse[1] = c.impulse[2] = 0;
-    hold_hinge(&c, 1, &u, &(double){0});
+    hold_hinge(&c, 1);
     give(&c, normal);
     keep_impulse(&c, 1, t, t);
     /* Friction that need not slow it can hold it from now on. */
@@ -548,7 +548,7 @@ static void strike(int i, int j, double t) {
     else {
         c.impulse[2] = 0;
         if (c.hung) couple(&c, back - u[0], u, c.impulse);
-        hold_hinge(&c, 1, &u, &back);
+        hold_hinge(&c, 1);
         give(&c, c.mass[0] * (back - u[0]));
     }
     if (is_tied(i) || is_tied(j)) end_blow();

@@ -2,6 +2,7 @@
 
 import json
 from contextlib import contextmanager
+from dataclasses import replace
 from math import sqrt
 from pathlib import Path
 from time import process_time
@@ -18,6 +19,7 @@ from chutelab.machine import build
 from chutelab.results import Kind, Recording
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import compare
+from chutelab.results.record import EVENT
 from chutelab.results.recorder import Recorder
 from chutelab.scene import SceneError, load, parse
 from chutelab.scene.conflicts import Row
@@ -259,6 +261,75 @@ def test_machines_that_differ_in_speeds_alone_keep_their_own():
     values = ["incoming.speed=1.4,1.4,2.0", "surface.ramp.speed=0.0,0.3"]
     block = block_of(parse(JOINED), values)
     assert_same(swept_block(block), swept_block(block, apart=True))
+
+
+SEVERAL = """
+gravity = 9.81
+[[surface]]
+name = "ramp"
+from = [-1.0, 1.0]
+to = [0.0, 0.5]
+friction = 0.1
+restitution = 0.3
+[[surface]]
+name = "flat"
+from = [0.0, 0.5]
+to = [0.5, 0.5]
+friction = 0.2
+[[surface]]
+name = "bowl"
+center = [0.9, 0.2]
+radius = 0.5
+from_deg = 180
+to_deg = 300
+restitution = 0.4
+friction = 0.3
+[[surface]]
+name = "belt"
+from = [-1, -1]
+to = [4, -1.1]
+speed = 1.5
+friction = 0.4
+restitution = 0.2
+[particle]
+radius = 0.01
+[stream]
+count = 4
+rate = 5
+at = [-0.9, 1.2]
+to = [-0.5, 1.2]
+velocity = [0.5, 0.0]
+[run]
+until = 3.0
+"""
+
+
+@pytest.mark.parametrize("scene", [SEVERAL, SEVERAL.replace("radius = 0.01", "radius = 0")])
+@pytest.mark.parametrize("key", [
+    "surface.ramp.restitution=0:0.6:4", "surface.flat.friction=0:0.5:4",
+    "surface.bowl.friction=0:1:4", "surface.bowl.restitution=0:0.5:4",
+    "surface.belt.speed=0:3:4", "surface.belt.friction=0.1,0.2,0.2,0.4",
+])  # fmt: skip
+@pytest.mark.parametrize("gate", ["", "opens_at = 0.9"])
+def test_what_members_share_is_to_the_bit_what_each_has_alone(scene, key, gate):
+    """A member alone shares nothing: the paths up to where members differ are its own."""
+    scene = scene.replace('name = "flat"', f'name = "flat"\n{gate}')
+    block = block_of(parse(scene), [key])
+
+    def told(block):
+        ((books, *columns),) = (
+            (one.by_surface.copy(), *(one.events[name].tolist() for name in EVENT.names))
+            for _, one in runs(block)
+        )
+        return books.reshape(len(block.values), -1).tolist(), [*zip(*columns, strict=True)]
+
+    assert EVENT.names[1] == "particle"
+    books, events = told(block)
+    for row in range(4):
+        (alone,), own = told(replace(block, values=block.values[[row]]))
+        assert alone == books[row]
+        own = [(t, particle + 4 * row, *rest) for t, particle, *rest in own]
+        assert own == [event for event in events if event[1] // 4 == row]
 
 
 def test_one_that_the_exact_engine_cannot_follow_spoils_no_other(monkeypatch):

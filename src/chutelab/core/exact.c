@@ -339,6 +339,7 @@ EXPORT int lay_out_exact(void) {
     E.knot_room = E.brief ? BRIEFLY : (int)many + 500;
     E.event_room = E.brief ? 10 * E.lone_count + ROUND_EVENTS : (int)many + 100;
     RESERVE(E.room, E.room_size);
+    lay_out_shared();
     E.knots = set_apart(E.knot_room, sizeof *E.knots);
     E.events = set_apart(E.event_room, sizeof *E.events);
     return has_room();
@@ -369,7 +370,7 @@ int follow_some(int end, int *rounds) {
             if (!(*rounds)--) return PAUSING;
             course = FINISHED;
             if (E.begun) proceed();
-            else begin();
+            else if (!take_shared()) begin();
             E.begun = 1;
             if (course != FINISHED) {
                 E.t = A.given->release + A.age, E.x = A.x, E.y = A.y;

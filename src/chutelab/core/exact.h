@@ -203,6 +203,13 @@ void look_round(void);
 void strike(int obstacle, int side);
 void pass_on(int obstacle, int side, int joint);
 
+/* exact_shared.c */
+void lay_out_shared(void);
+void forget_shared(void);
+int is_parting(int obstacle);
+void keep_shared(int obstacle, int side);
+int take_shared(void);
+
 /* exact_pieces.c */
 int lay_obstacles(int member);
 void fit_obstacles(void);

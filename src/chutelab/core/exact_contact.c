@@ -454,6 +454,7 @@ static void slide_past(int obstacle, int side, double rebound, int soft) {
 
 /* Resolve a contact with an obstacle that has just been reached. */
 void strike(int obstacle, int side) {
+    if (is_parting(obstacle)) keep_shared(obstacle, side);
     if (A.way == RIDES_BELT) part_from(0);
     snap(obstacle, side);
     Touch c = touch_of(obstacle, side);
@@ -493,6 +494,7 @@ void strike(int obstacle, int side) {
 void pass_on(int obstacle, int side, int joint) {
     int ends = obstacle == NONE, left = A.on, face = A.side;
     if (ends) obstacle = left, side = face;
+    is_parting(obstacle);
     Touch c = touch_of(obstacle, side);
     const Obstacle *o = O.all + obstacle, *from = O.all + left;
     if (ends || !is_pressed(&c)) {

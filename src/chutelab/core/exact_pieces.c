@@ -328,6 +328,7 @@ int lay_obstacles(int member) {
         set_speeds(member);
         return 1;
     }
+    forget_shared();
     arena = E.room, arena_end = E.room + E.room_size, arena_full = 0;
     parts = take_room(E.segment_count, sizeof *parts);
     bends = take_room(E.arc_count, sizeof *bends);

@@ -463,7 +463,7 @@ def test_variants_are_refused_as_their_scenes_are_by_the_rules_that_read_what_va
     scene, settings, values, monkeypatch
 ):
     base, told, cost = load(scene, settings), [], []
-    judge, read, count = Judge(base), Row.__getitem__, []
+    judge, read, count = Judge(base, (*values,)), Row.__getitem__, []
     monkeypatch.setattr(Row, "__getitem__", lambda row, key: count.append(key) or read(row, key))
     for row in zip(*values.values(), strict=True):
         own = dict(zip(values, row, strict=True))

@@ -256,7 +256,9 @@ class Judge:
     varied keys finds the same in all variants, and is made once.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, paths: tuple[str, ...]) -> None:
+        self.scene, self.paths = scene, paths
+        self.example: Scene | None = None  # a variant that is valid, if one is known
         self._document = plain(to_dict(scene)) | {"expect": []}
         self._places: dict[str, tuple[Any, Any]] = {}
         self._telling: list[Check] = []

@@ -78,6 +78,16 @@ class Block:
         return dict(zip(self.paths, self.values[row].tolist(), strict=True))
 
 
+_judges: list[Judge] = []
+"""The latest one: all blocks of a plan have the same scene."""
+
+
+def _judge_of(block: Block) -> Judge:
+    if not (_judges and _judges[0].scene is block.scene and _judges[0].paths == block.paths):
+        _judges[:] = [Judge(block.scene, block.paths)]
+    return _judges[0]
+
+
 def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
     """Validate the variants of a block whose keys are plain numbers.
 
@@ -89,7 +99,8 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
     values = block.values
     good = np.stack([accepted(*column) for column in zip(block.paths, values.T, strict=True)]).T
     sound = np.asarray(good.all(axis=1))
-    asked, judge = np.full(len(block.paths), not sound.any()), Judge(block.scene)
+    judge = _judge_of(block)
+    asked = np.array([judge.reads(path) or not sound.any() for path in block.paths])
     while True:
         telling = np.where(good & ~asked, 0.0, values)
         _, first, group = np.unique(
@@ -100,7 +111,7 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
         if not np.any(more & ~asked):
             break
         asked |= more
-    template, wrong = None, dict[int, str]()
+    template, wrong = judge.example, dict[int, str]()
     for number, row in enumerate(first.tolist()):
         if template is not None and fair[number]:
             continue
@@ -109,6 +120,7 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
             template = template or scene
         except SceneError as error:
             wrong[number] = reason(error)
+    judge.example = template
     faults = {n: wrong[g] for n, g in enumerate(group.ravel().tolist()) if g in wrong}
     return template, np.delete(np.arange(len(values)), list(faults)), faults
 

@@ -14,6 +14,9 @@
 /* Greatest number of knots and events that a round writes. */
 #define ROUND_KNOTS 400
 #define ROUND_EVENTS 32
+/* Each way to move has a stack frame of its own: within one function that has all of them, the compiler keeps fewer numbers
+   in registers. */
+#define APART __attribute__((noinline))
 /* Number of knots for which room is made at first in a family, of which a few particles run at a time. */
 #define BRIEFLY 2000
 
@@ -60,7 +63,7 @@ static void drop(void) {
     let_go(NONE, 0, 0, NONE);
 }
 
-static void fly(void) {
+APART static void fly(void) {
     const double *box = A.given->exit_box, *up = A.given->up;
     Motion m = motion_of(0.0, -A.given->gravity);
     double leaves = INFINITY;
@@ -89,7 +92,7 @@ static void put_round(double rho, double up, double across, double pace, double 
 }
 
 /* Carry the particle by adhesion round the pulley, from an angle to cos phi1 = v2/(g rho). */
-static void carry_round(double start, double pace) {
+APART static void carry_round(double start, double pace) {
     const Obstacle *pulley = O.all + O.pulley;
     Bound found[2];
     double up, across, g = A.given->gravity, stop = next_change(), left = stop - A.age, end = start;
@@ -135,7 +138,7 @@ static void carry_round(double start, double pace) {
 }
 
 /* Move the particle along the belt to the pulley, or to what is in the way. */
-static void carry(void) {
+APART static void carry(void) {
     double up, across, incline = E.wheels[member_of(E.lone)].incline;
     sin_cos(incline, &up, &across);
     /* It was on the pulley already when a gate changed. */
@@ -160,7 +163,7 @@ static void carry(void) {
 }
 
 /* Move the particle by one step of a ride, or to the next event, and resolve that. */
-static void ride(void) {
+APART static void ride(void) {
     int circle = A.on;
     const Obstacle *o = O.all + circle;
     Touch c = touch_now();
@@ -228,7 +231,7 @@ static void ride(void) {
 }
 
 /* Continue at the end of a face: on the next segment, round the end, or in flight. */
-static void leave_face(void) {
+APART static void leave_face(void) {
     const Obstacle *o = O.all + A.on;
     double foot = (A.x - o->x) * o->tx + (A.y - o->y) * o->ty;
     int tip = 2 * A.on + (foot > 0.5 * o->length), face = A.side < 0;
@@ -238,7 +241,7 @@ static void leave_face(void) {
 }
 
 /* Move the particle on a face to its next event, and resolve that. */
-static void slide(void) {
+APART static void slide(void) {
     Touch c = touch_now();
     const Obstacle *o = O.all + A.on;
     double force, couple, pull = face_force(&c, &force, &couple), mass = A.given->mass;
@@ -280,7 +283,7 @@ static void slide(void) {
 }
 
 /* Start a particle; if it would start after the end of the run, it is over at once. */
-static void begin(void) {
+APART static void begin(void) {
     const Lone *p = E.lones + E.lone;
     double inertia = p->inertia, arm = p->mass * p->radius * p->radius;
     A = (Particle){ .given = p, .x = p->position[0], .y = p->position[1], .vx = p->velocity[0],

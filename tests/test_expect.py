@@ -290,8 +290,8 @@ def test_each_shipped_scene_says_what_it_shows_and_by_what_source(name):
 
 SECONDS_IN_PYMUNK = (
     *("bucket-elevator", "coal-transfer", "cradle", "damper-plate", "domino-gate", "dominoes"),
-    *("drum", "flap-gate", "heap", "hopper", "loop", "rock-box", "silo", "slip", "stream"),
-    "vibrating-feeder",
+    *("drum", "feeder", "flap-gate", "galton", "heap", "hopper", "loop", "rock-box", "silo"),
+    *("slip", "stream", "vibrating-feeder"),
 )
 """Scenes that take Pymunk 1.5 s or more: with it they are verified in the slow tests."""
 

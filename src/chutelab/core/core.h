@@ -446,6 +446,7 @@ int is_alone(const Contact *c, const double *before);
 void hold(Disk *d, int k);
 double soft_approach(const Disk *d, double radius);
 double left_over(const Disk *d, int impacts, int surface, double radius, int sunk, double t);
+double left_by_corners(int i, int j, double gap, double t);
 void lie_down(int i);
 void was_moved(int i);
 

@@ -7,11 +7,10 @@
 #define LASTING 0.9914
 /* Overlap, in radii, that a slow approach of supported particles may reach by the end of the step: such an approach is
    left to the next step, as an impact on a pile causes impacts without end. The next solve removes as much at once, see
-   touching.c. One that is deeper already may become deeper by MORE. For corners it is always LATE_CORNERS, and the
-   approach may be faster, up to LATEST: an impact of boxes is passed on four times as often. */
+   touching.c. One that is deeper already may become deeper by MORE. With corners the approach may be faster, up to
+   LATEST: an impact of boxes is passed on four times as often. */
 #define LATE 5e-3
 #define MORE 1e-3
-#define LATE_CORNERS 2e-3
 
 /* ------------------------------------------------------------------ the next event of each disk */
 
@@ -84,10 +83,12 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
     if (has_corners(d)) {
         /* A corner in contact comes back as fast as gravity, the rotation, the surface and the inside of an arc make it. That
-           of a particle in flight arrives: its blow is left only if it is as slow as a fall within a step. */
+           of a particle in flight arrives: its blow is left only if it is as slow as a fall within a step. In a crowd it may get as deep as between particles. */
         double haste = surface >= 0 && d->lies ? hastes(surface_at(surface, d->t), d) : 0;
         double bends = d->bends > 0 && surface >= 0 && is_held(d, surface) ? d->bends : 0;
-        least = MAX(least, 1.000001 * (W.g + d->whirl + haste + bends) * W.step);
+        double press = W.g + d->whirl + haste + bends, back = 1.000001 * press * W.step, left = W.step_end - t;
+        if (W.interact && !are_few(W.contact_count) && left > 0) back = MIN(back, LATE * radius / left);
+        least = MAX(least, back);
         sunk = 0;
     } else if (surface >= 0 && (W.interact || d->held_count))
         sunk = gap_to(surface_at(surface, d->t), d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius;
@@ -105,45 +106,48 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     return grown(least, impacts, sunk ? STUCK : surface >= 0 ? 2 * JAM : MANY, skip);
 }
 
-/* Approach up to which two particles of a crowd, of which one is supported, are left to the next step at t, m/s: until the
-   end of the step they may approach by `overlap`, see LATE. */
-static double left_late(const Disk *a, const Disk *b, double overlap, double most, double t) {
+/* Approach up to which two particles of a crowd, of which one is supported, are left to the next step at t, where their gap
+   is negative if they overlap, m/s: see LATE. */
+static double left_late(const Disk *a, const Disk *b, double radius, double gap, double most, double t) {
     if (!W.interact || !(a->supports || b->supports) || !(t < W.step_end)) return 0;
-    return MIN(most, W.eager * overlap / (W.step_end - t));
+    return MIN(most, W.eager * MAX(LATE * radius + MIN(gap, 0), MORE * radius) / (W.step_end - t));
 }
 
 /* Approach up to which two disks are left to the next step at t, where their gap is negative if they overlap, m/s. */
 static double left_between(const Disk *a, const Disk *b, double radius, double gap, double t) {
     int sunk = gap < -SUNK * radius;
     double least = left_over(a, MAX(a->impacts, b->impacts), -1, radius, sunk, t);
-    return sunk ? least : MAX(least, left_late(a, b, MAX(LATE * radius + MIN(gap, 0), MORE * radius), W.soft, t));
+    return sunk ? least : MAX(least, left_late(a, b, radius, gap, W.soft, t));
 }
 
 /* The same for two particles of which one has corners. */
-static double left_by_corners(const Disk *a, const Disk *b, int impacts, double t) {
+double left_by_corners(int i, int j, double gap, double t) {
+    const Disk *a = W.disks + i, *b = W.disks + j;
     double small = MIN(a->inner, b->inner), back = 1.000001 * (W.g + MAX(a->whirl, b->whirl)) * W.step;
+    if (!are_few(W.contact_count) && (a->supports || b->supports))
+        back = left_late(a, b, small, gap, MAX(back, LATEST * W.soft), t);
     double least = MAX(MAX(soft_approach(a, small), back), MAX(a->open, b->open));
     if (a->halved || b->halved) least = MAX(least, LEFT_BY_TURNS * W.pace);
-    if (!are_few(W.contact_count)) least = MAX(least, left_late(a, b, LATE_CORNERS * small, LATEST * W.soft, t));
-    return grown(least, impacts, MANY, W.skip * small);
+    return grown(least, MAX(a->impacts, b->impacts), MANY, W.skip * small);
 }
 
-/* When particle i meets j, of which one has corners, between a time and the end of the step. */
-static RARELY double meet_cornered(int i, int j, double from) {
+/* When particle i meets j, of which one has corners, between two times of the step. */
+static RARELY double meet_cornered(int i, int j, double from, double until) {
     int first = has_corners(W.disks + i) ? i : j, other = first == i ? j : i;
-    const Disk *d = W.disks + first, *o = W.disks + MAX(other, 0);
-    int impacts = MAX(d->impacts, other >= 0 ? o->impacts : 0);
-    double most = fastest_of(first, other, from, W.step_end - from);
+    const Disk *d = W.disks + first;
+    until = MIN(until, W.step_end);
+    double most = fastest_of(first, other, from, until - from);
     /* Any approach of a corner up to this is left to the next step. */
     if (most == INFINITY || most <= W.g * W.step) return INFINITY;
-    double soft = other < 0 ? left_over(d, impacts, -1 - other, d->inner, 0, from) : left_by_corners(d, o, impacts, from);
-    return meet_corners(first, other, from, W.step_end, most, soft);
+    double soft = other < 0 ? left_over(d, d->impacts, -1 - other, d->inner, 0, from)
+                            : left_by_corners(first, other, -INFINITY, from);
+    return meet_corners(first, other, from, until, most, soft);
 }
 
 static void foresee_pair(int i, int j, double *due, int *partner) {
     const Disk *a = W.disks + i, *b = W.disks + j;
     if (is_cornered(i, j)) {
-        double then = meet_cornered(i, j, W.now);
+        double then = meet_cornered(i, j, W.now, *due);
         if (then >= *due || then >= W.step_end) return;
         *due = then;
         *partner = j;
@@ -189,7 +193,7 @@ static void foresee_surfaces(int i, double *due, int *partner) {
         const Surface *s = surface_at(k, d->t);
         if (s->mover >= 0 && !stirs(s) && d->mode == ASLEEP && d->ux == 0 && d->uy == 0) continue;
         if (!has_corners(d) && stirs(s) && closing(s, d, W.step_end - d->t) <= left_over(d, d->impacts, k, d->radius, 0, d->t)) continue;
-        double t = has_corners(d) ? meet_cornered(i, -1 - k, MAX(W.now, d->t + wait)) : wait > 0 ? meet_after_wait(s, d, wait, &approach)
+        double t = has_corners(d) ? meet_cornered(i, -1 - k, MAX(W.now, d->t + wait), *due) : wait > 0 ? meet_after_wait(s, d, wait, &approach)
             : d->t + meet_surface(s, d, W.step_end - d->t, &approach);
         /* A disk that moves round an end within the step arrives at the side that lets it pass. */
         if (s->one_sided && t < W.step_end) {
@@ -585,26 +589,26 @@ static int struck_too(const Contact *c, double t, int *j) {
     advance(a, t);
     if (c->cornered) {
         Contact list[MOST_TOUCHES];
-        double u[3], soft, most = 0, lasting = 0;
+        double u[3], soft = 0;
+        int moves = c->j < 0 && stirs(W.surfaces + (-1 - c->j)), fast = moves || are_few(W.contact_count);
         if (c->j >= 0 && b->mode != FREE) return 0;
         if (c->j >= 0) {
             advance(b, t);
-            soft = left_by_corners(a, b, MAX(a->impacts, b->impacts), t);
+            soft = left_by_corners(c->i, c->j, -INFINITY, t);
             double x = a->vx - b->vx, y = a->vy - b->vy, turns = fabs(a->spin) * a->radius + fabs(b->spin) * b->radius;
             if (turns < soft && x * x + y * y <= square(soft - turns)) return 0;
         } else soft = left_over(a, a->impacts, -1 - c->j, a->inner, 0, t);
         /* At the places in contact it must approach faster than that; what has rotated or closed since is foreseen. */
-        int moves = c->j < 0 && stirs(W.surfaces + (-1 - c->j));
-        for (const Contact *o = c; o >= W.contacts && o->i == c->i && o->j == c->j && !moves; o--) {
+        for (const Contact *o = c; o >= W.contacts && o->i == c->i && o->j == c->j && !fast; o--) {
             relative(o, 0, u);
-            lasting = MAX(lasting, -u[0]);
+            fast = -u[0] > (c->j < 0 ? soft : left_by_corners(c->i, c->j, o->gap, t));
         }
-        if (!moves && !are_few(W.contact_count) && lasting <= soft) return 0;
+        if (!fast) return 0;
         for (int n = list_struck(c->i, c->j, t, list) - 1; n >= 0; n--) {
             relative(list + n, 0, u);
-            most = MAX(most, -u[0]);
+            if (-u[0] > (c->j < 0 ? soft : left_by_corners(c->i, c->j, list[n].gap, t))) return 1;
         }
-        return most > soft;
+        return 0;
     }
     if (c->j < 0) {
         const Surface *s = face_at(surface_at(-1 - c->j, t), a->x, a->y);

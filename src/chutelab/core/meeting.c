@@ -5,6 +5,8 @@
 /* Least number of steps in which gaps are checked over a span. A contact that begins and ends within one is left to the
    next step. */
 #define STRIDES 8
+/* rad; in none of them either of the two rotates by more. */
+#define TURNS 0.0125
 /* rad; a particle that rotates by more in a span may leave something round by one corner and meet it with the next. */
 #define ROLLS 0.05
 /* Greatest number of iterations to the instant of an impact; bisections reach its last bit if need be ... */
@@ -158,12 +160,14 @@ static double overlap_at(int i, int j, double low, double high) {
     }
 }
 
-/* Whether a place at which two touch at t closes faster than `soft`. */
+/* Whether a place at which two touch at t closes faster than `soft`, and than what is left of two particles there. */
 static int closes_faster(int i, int j, Shape *a, Shape *b, double t, double within, double soft) {
     Touch places[MOST_TOUCHES];
     int count = list_places_of(a, b, TOUCH * inner_of(i, j), within, places);
-    for (int n = 0; n < count; n++)
-        if (closes_at(i, j, a, b, t, places + n) > soft) return 1;
+    for (int n = 0; n < count; n++) {
+        double fast = closes_at(i, j, a, b, t, places + n);
+        if (fast > soft && (j < 0 || fast > left_by_corners(i, j, places[n].gap, t))) return 1;
+    }
     return 0;
 }
 
@@ -195,7 +199,7 @@ static double rolls_at(int i, int j, double low, double high, double soft) {
 }
 
 /* The instant between two times at which particle i, which has corners, meets j faster than `soft`, or INFINITY; `most`
-   is the bound of `fastest_of`. */
+   is the bound of `fastest_of`. Two particles may be left to the next step up to a faster approach, see `left_by_corners`. */
 double meet_corners(int i, int j, double from, double until, double most, double soft) {
     double span = until - from, small = inner_of(i, j), near = TOUCH * small;
     double h = 0, first = INFINITY, gap[CANDIDATES];
@@ -203,8 +207,10 @@ double meet_corners(int i, int j, double from, double until, double most, double
     if (!(span > 0) || most <= soft) return INFINITY;
     Shape a = shape_of(i, from), b = shape_of(j, from);
     int count = a.count + b.count, on_segment = b.s && b.s->shape == SEGMENT, both = !b.s && b.round < 0;
+    double fastest = MAX(fabs(W.disks[i].spin), j < 0 ? 0 : fabs(W.disks[j].spin)), least_stride = span / STRIDES;
     double turn = both ? fabs(W.disks[i].spin) + fabs(W.disks[j].spin) : 0;
     double bends = turn * (2 * most + 4 * turn * MAX(W.disks[i].radius, both ? W.disks[j].radius : 0));
+    if (fastest > 0) least_stride = MIN(least_stride, TURNS / fastest);
     if (are_apart(&a, &b, most * span + near)) return INFINITY;
     closed = both && overlap(&a, &b);
     clear = both && !closed;
@@ -231,7 +237,7 @@ double meet_corners(int i, int j, double from, double until, double most, double
             if (gap[in_reach[n]] > 0) least = MIN(least, gap[in_reach[n]]);
             else if (rolls && in_reach[n] == a.count + b.round) least = 0;
         }
-        h = MIN(h + MAX(least / most, span / STRIDES), span);
+        h = MIN(h + MAX(least / most, least_stride), span);
         double t = h < span ? from + h : until, closes;
         Shape a2, b2;
         if (!both) a2 = shape_of(i, t), b2 = shape_of(j, t);

@@ -31,8 +31,6 @@
 #define FINE_FEW 1e-11
 /* The same over many contacts, as a share of that of disks: with less a pile of boxes does not come to rest. */
 #define CROWD_CORNERS 0.3
-/* Share of the sweeps that a pile of boxes gets while something in it moves: the next step continues them anyway. */
-#define FEWER 0.5
 /* Friction below this share of its bound holds. */
 #define HOLDS 0.999
 /* Where belts have pressed a contact deep, gaps may miss no more than this share of the slowest one's speed: else such a belt
@@ -308,7 +306,7 @@ void solve_contacts(int again) {
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
         double least = INFINITY, heaviest = 0, slowest = INFINITY;
-        int driven = 0, sunk = 0, pushed = 0, cornered = 0, tied = 0, stirred = 0, rests = 0, bent = 0, halved = 1;
+        int driven = 0, sunk = 0, pushed = 0, cornered = 0, tied = 0, rests = 0, bent = 0, halved = 1;
         W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
@@ -324,7 +322,6 @@ void solve_contacts(int again) {
             bent |= c->cornered && c->turns > 0;
             rests |= sleeps(c->j);
             tied |= is_tied(c->i) || is_tied(c->j);
-            stirred |= (a->supports && a->rest == 0) || (b->supports && b->rest == 0);
         }
         swings |= W.swings_too;
         for (const Contact *c = list; c < W.contacts + to && !again; c++)
@@ -343,13 +340,9 @@ void solve_contacts(int again) {
             if (!driven) W.contacts[n].parts = INFINITY;
         }
         double accurate = W.accurate, enough = W.skip * least;
-        int sweeps = W.sweeps;
         int few = to - from <= FEW_CONTACTS && (!rests || are_few(W.contact_count));
         if ((cornered || tied || W.swings_too) && few) accurate = FINE_FEW * W.pace;
-        else if (cornered) {
-            accurate = CROWD_CORNERS * accurate;
-            if (stirred) sweeps = (int)(FEWER * sweeps);
-        }
+        else if (cornered) accurate = CROWD_CORNERS * accurate;
         /* Between a surface that pushes and sleepers, which do not give way, there may be no room: they wake. */
         for (Contact *c = list; c < list + to - from && pushed && rests; c++)
             if (sleeps(c->j)) W.disks[c->j].stirred = 1;
@@ -357,8 +350,8 @@ void solve_contacts(int again) {
         int locks = sunk && slowest < INFINITY;
         if (locks) enough = MIN(enough, YIELDS * slowest);
         int rounds = locks || (pushed && rests) ? 1 : MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS);
-        if (bent) solve_bent(list, to - from, rounds, sweeps, accurate, enough, FINE * least);
-        else if (W.interact) sweep_contacts(list, to - from, rounds, sweeps, PLAIN, accurate, enough);
+        if (bent) solve_bent(list, to - from, rounds, W.sweeps, accurate, enough, FINE * least);
+        else if (W.interact) sweep_contacts(list, to - from, rounds, W.sweeps, PLAIN, accurate, enough);
         else solve_alone(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);

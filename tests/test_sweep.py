@@ -304,7 +304,15 @@ until = 3.0
 """
 
 
-@pytest.mark.parametrize("scene", [SEVERAL, SEVERAL.replace("radius = 0.01", "radius = 0")])
+STRAIGHT_ON = SEVERAL.replace(
+    "from = [0.0, 0.5]\nto = [0.5, 0.5]", "points = [[0.0, 0.5], [0.2, 0.4], [0.2, 0.8]]"
+).replace("restitution = 0.3", "restitution = 0.0")
+"""It slides on to the second surface without a blow, then against its wall."""
+
+
+@pytest.mark.parametrize(
+    "scene", [SEVERAL, STRAIGHT_ON, SEVERAL.replace("radius = 0.01", "radius = 0")]
+)
 @pytest.mark.parametrize("key", [
     "surface.ramp.restitution=0:0.6:4", "surface.flat.friction=0:0.5:4",
     "surface.bowl.friction=0:1:4", "surface.bowl.restitution=0:0.5:4",

@@ -176,7 +176,7 @@ def test_a_plate_leaning_back_reads_its_angle():
 # The figure
 
 
-@pytest.mark.parametrize("name", SHOWN)
+@pytest.mark.parametrize("name", [*SHOWN, "flap-gate"])
 def test_no_text_is_cut_off_overlapping_or_small(name):
     figure = plots.overlay(simulate(scene.load(name)))
     figure.canvas.draw()

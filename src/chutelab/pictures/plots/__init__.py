@@ -166,7 +166,7 @@ def overlay(
     else:
         draw_velocity(panels[0], recording, parts, start)
     drawn_ledger = draw_ledger(panels[1], recording, details=details)
-    figure.legend(
+    legend = figure.legend(
         *drawn_ledger.get_legend_handles_labels(),
         loc="lower center",
         bbox_to_anchor=(0.8075, 0.005),
@@ -176,6 +176,10 @@ def overlay(
         handlelength=1.4,
         columnspacing=1.0,
     )
+    # Hinges and springs have entries of their own, in one more row.
+    side.bottom = max(side.bottom, legend.get_window_extent().y1 / figure.bbox.height + 0.065)
+    for row, panel in enumerate(panels):
+        panel.set_position(side[row].get_position(figure))
     figure.headline(0.06, 0.965, recording.title)
     count = figures(recording.count, ",")
     said = say("one") if recording.count == 1 else say("all", count=count)

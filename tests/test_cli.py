@@ -19,6 +19,7 @@ from PIL import Image
 import chutelab
 from chutelab import scene as sc
 from chutelab.cli import console, main
+from chutelab.cli.options import retitled
 from shared import call
 from test_summary import TOP
 
@@ -118,6 +119,9 @@ def test_a_changed_machine_does_not_go_by_the_bare_title():
     assert call("run", "perpendicular", *changes).stdout.splitlines()[0] == told
     call("run", "perpendicular", *changes, "--out", "out", "--only", "npz")
     assert call("show", "out/recording.npz").stdout.splitlines()[0] == told
+    # A solution of `solve --set` is a changed scene, changed once more.
+    twice = retitled(retitled(sc.load("perpendicular"), ["gravity=3"]), ["plate.angle_deg=5"])
+    assert twice.title == f"{title}; with gravity=3, plate.angle_deg=5"
     for same in (["--set", "run.engine=pymunk"], ["--dt", "0.001"], []):
         assert call("run", "perpendicular", *same).stdout.splitlines()[0] == title
     own = call("run", "perpendicular", *changes, "--set", "title=Ours").stdout
@@ -168,7 +172,7 @@ def test_the_papers_energy_and_power_are_marked_and_the_true_power_is_beside_the
     assert re.search(rf"^P +the paper's power, Eq. \(15\), W +{papers:g} +{papers:g}", text, re.M)
     assert re.search(rf"^ +its power, to compare with P, W +{true:g} +{true:g} *$", text, re.M)
     assert "the paper's energy, Eq. (14), J" in text
-    assert "Energy ledger until all have settled, J" in text
+    assert "Energy ledger until all have settled or left, J" in text
     assert "Energy ledger until the landing, J" in call("run", "perpendicular").stdout
     timed = call("run", "perpendicular", "--set", "run.until=0.7").stdout
     assert "Energy ledger until t = 0.7 s, J" in timed

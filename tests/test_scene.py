@@ -231,6 +231,7 @@ def test_each_shipped_scene_has_a_title_and_three_lines_on_what_to_look_at(name)
     assert scene.title == about.title
     assert scene.title not in {name, "Untitled scene"}
     assert len(about.look) == 3
+    assert about.look[0].endswith((".", "?")), "`chutelab scenes` shows the first line alone"
     assert all(30 < len(line) < 100 for line in about.look)
     assert sc.from_dict(sc.to_dict(scene)) == scene
 

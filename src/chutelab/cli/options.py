@@ -272,7 +272,8 @@ def retitled(scene: Scene, changes: Sequence[str]) -> Scene:
     told = [change for change in stripped if not change.startswith(("run.", "live."))]
     if not told:
         return scene
-    title = f"{scene.title}; with {', '.join(told)}"
+    joint = ", " if "; with " in scene.title else "; with "
+    title = joint.join((scene.title, ", ".join(told)))
     return scene.model_copy(update={"title": title if len(title) <= 200 else f"{title[:198]} …"})
 
 

@@ -292,7 +292,7 @@ def sheets(recording: Record, *, details: bool = False) -> list[Sheet]:
         parts += nominal
     until = recording.scene.run.until
     # Belt work goes on after the landing; `belt_work` above counts until nothing slips.
-    ends = {"landed": "the landing", "settled": "all have settled"}.get(
+    ends = {"landed": "the landing", "settled": "all have settled or left"}.get(
         str(until), f"t = {until} s"
     )
     balance = ledger(recording).sheet(details=details)

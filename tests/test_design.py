@@ -312,6 +312,7 @@ BAD = [
     (("--vary", "plate.angle_deg=0m:1m", *AIM), "is in degrees, not in m"),
     (("--vary", "plate.angle_deg=0:a", *AIM), "is not a number"),
     (("--vary", "plate.angle_deg=0:nan", *AIM), "is not a number"),
+    (("--vary", "plate.angle_deg=0:20-40", *AIM), "20-40 is not a number"),
     (("--vary", "plate.angle_deg=0:90", *AIM), "plate.angle_deg = 90"),
     (("--vary", "plate.restitution=0:1.5", *AIM), "from 0 to 1"),
     (("--vary", "stream.count=1:5", *AIM), "whole number"),

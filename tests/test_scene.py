@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from chutelab import scene as sc
 from chutelab.scene.overrides import limits_of, rule_at, sized, unit_of
 from chutelab.scene.schema import TABLES, SceneTables, to_dict
-from chutelab.scene.units import UNITS, size_in
+from chutelab.scene.units import UNITS, read_size, size_in
 
 CONVEYOR = """
 [incoming]
@@ -474,6 +474,12 @@ def test_texts_take_units(text, path, value):
     assert found == value
 
 
+@pytest.mark.parametrize("unit", UNITS)
+def test_every_known_unit_can_be_written(unit):
+    si, size = UNITS[unit]
+    assert read_size(f"2 {unit}") == (pytest.approx(2.0 * size, rel=1e-15), si)
+
+
 def test_every_key_of_a_table_takes_numbers_with_its_own_unit_alone():
     """What the tables tell of units is what the whole schema says, at every key."""
     texts = [f"2 {unit}".strip() for unit in (*UNITS, "kg/m³", "N m", "miles")]
@@ -490,7 +496,7 @@ def test_every_key_of_a_table_takes_numbers_with_its_own_unit_alone():
     ("text", "says"),
     [
         ("particle.radius=4s", '"4s": must be a number'),
-        ("incoming.speed=2 m", ", in m/s (from --set incoming.speed=2 m)"),
+        ("incoming.speed=2 m", ", km/s (from --set incoming.speed=2 m)"),
         ("particle.radius=4,5mm", "write 4.5, with a decimal point"),
         ("plate.restitution=0.5m", "must be a number from 0 to 1"),
         ("stream.count=3m", "must be a whole number"),

@@ -450,4 +450,6 @@ def _syntax_fault(text: str, message: str) -> Fault:
         line, column = int(place[1]), int(place[2])
     reason = message[: place.start()] if place else message
     found = lines[line - 1].strip() if line <= len(lines) else ""
-    return Fault(f"line {line}, column {column}", found, f"not TOML: {reason}")
+    unquoted = re.search(r"=[^\"'{#]*[^\W\d_]", found)
+    advice = "; put texts, and numbers with units, in quotation marks" if unquoted else ""
+    return Fault(f"line {line}, column {column}", found, f"not TOML: {reason}{advice}")

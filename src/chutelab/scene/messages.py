@@ -26,6 +26,7 @@ from chutelab.scene.overrides import (
 )
 from chutelab.scene.schema import TABLES, SceneTables
 from chutelab.scene.tables import Live
+from chutelab.scene.units import read_any, units_of
 from chutelab.util.errors import MISSING, Fault, InputError, nearest
 
 Location = tuple[str | int, ...]
@@ -56,7 +57,7 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
         cause = detail.get("ctx", {}).get("error")
         if isinstance(cause, ConflictError):
             continue
-        parts, missing = detail["loc"], detail["type"] == "missing"
+        parts, missing, unit = detail["loc"], detail["type"] == "missing", ""
         if parts[0] in EITHER and isinstance(document.get(str(parts[0])), Mapping):
             parts = (parts[0], *parts[2:])
         if detail["type"] == "extra_forbidden":
@@ -72,6 +73,8 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
             allowed = _listed(_phrases(rule)) + (f", in {unit}" if unit else "")
             text = str(cause) if cause else allowed if missing else f"must be {allowed}"
         value = MISSING if missing else at_path(document, parts)
+        if isinstance(value, str) and unit and read_any(value)[1] not in ("", unit):
+            text += f"; units are {', '.join(units_of(unit))}"
         if value is MISSING and not missing:
             # For keys that were given as nested tables.
             value = detail["input"]

@@ -73,7 +73,9 @@ UNITS: Final = {
 """Known units, each as an SI unit (degrees for angles) and its factor; % is a share, and "" a
 count."""
 
-SIZE: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d,].*)?")
+SIZE: Final = re.compile(
+    r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *((?<= )1/s|[^\s\d,+-].*)?"
+)
 """A number and its unit, if there is one."""
 
 
@@ -123,6 +125,15 @@ def size_in(text: str, unit: str) -> float | None:
     """
     number, found = read_any(text)
     return number if found == (unit or "%") else None
+
+
+def units_of(unit: str) -> list[str]:
+    """Return the units in which a size of this SI unit can be written.
+
+    >>> units_of("degrees"), units_of("kg/m³")
+    (['degrees', 'deg', '°'], ['kg/m³'])
+    """
+    return [written for written, (known, _) in UNITS.items() if known == unit] or [unit]
 
 
 def symbol(unit: str) -> str:

@@ -220,7 +220,7 @@ def build(lessons: LessonNames = (), *, out: Folder, force: bool, quiet: bool) -
 
 @command("Start a lesson of your own.", lesson)
 def new(name: Path, *, from_: LessonName | None) -> None:
-    """Start a lesson of your own: a folder NAME with lesson.toml, worksheet, explanation and scene.
+    """Start a lesson of your own: a folder NAME with lesson.toml, a scene and a notebook.
 
     It can be shown and built at once; change it from there. With --from it is a copy of a shipped
     lesson, to adapt one, or to work through it. Nothing is ever overwritten.

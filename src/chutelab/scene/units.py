@@ -73,9 +73,7 @@ UNITS: Final = {
 """Known units, each as an SI unit (degrees for angles) and its factor; % is a share, and "" a
 count."""
 
-SIZE: Final = re.compile(
-    r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *((?<= )1/s|[^\s\d,+-].*)?"
-)
+SIZE: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *((?<= )1/s|[^\s\d,+-].*)?")
 """A number and its unit, if there is one."""
 
 

@@ -191,6 +191,27 @@ def test_side_by_side_with_a_simulated_stream():
         side_by_side("galton")
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [{"pair": [{"between": ["grain", "incoming"], "friction": 0.3}]}, {"air_density": 1.2}],
+)
+def test_the_simulated_stream_is_that_of_the_scene(changes):
+    """It passes where the scene's own particle lands: with values of its pair, and in its air."""
+    name = {"particle.name": "grain", "particle.mass": 1e-4}
+    whole = chutelab.load(
+        "slip", {"plate.distance": 9.0, "outgoing.drop_from": "top", **name} | changes
+    )
+    landing = chutelab.simulate(whole).summary()["landing"]
+    found = side_by_side(whole, landing["y"]).lines["simulated"][1]
+    assert found == pytest.approx(landing["x"], abs=2e-6)
+
+
+def test_a_simulated_bed_of_particles_that_ignore_each_other_is_told():
+    """On a belt with Coulomb friction all lie on the belt itself, whatever the methods' depth."""
+    bed = {"stream.count": 5, "stream.bed_height": 0.06}
+    assert "has no depth" in " ".join(side_by_side(chutelab.load("slip", bed)).sheet().notes)
+
+
 def test_the_simulated_stream_is_counted_by_hand():
     """2, 50 and 98 % of where centres pass a height; edges lie r |v| / |v_y| beside."""
     first = chutelab.scene.to_dict(chutelab.load("stream", {"stream.count": 40}))["stream"]

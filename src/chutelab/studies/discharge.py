@@ -39,7 +39,7 @@ EDGES = ("lower", "centre", "upper")
 class SideBySide:
     """Streams by all methods and by simulation."""
 
-    # the simulated scene: only belt and particles of the given one
+    # the simulated scene: only belt, particles and air of the given one
     scene: Scene
     heights: Floats  # (H,), above the pulley's axis, m
     methods: dict[str, Discharge]  # the stream of each method that has an answer
@@ -66,6 +66,12 @@ class SideBySide:
             told = [f"{edge} {x:+.1f}" for edge, x in zip(EDGES, off, strict=True) if not isnan(x)]
             at = f"{name} less simulated, at y = {self.heights[-1]:g} m"
             notes += [f"{at}: {', '.join(told)} mm"] if told else []
+        bed, belt = self.scene.stream, self.scene.incoming
+        if bed.bed_height and not bed.interact and belt and belt.friction != "adhesion":
+            notes.append(
+                "The simulated bed has no depth: its particles ignore each other, so all lie on the"
+                " belt. stream.interact = true keeps them apart."
+            )
         notes.append(f"Left out, as their rules are not known well enough: {', '.join(LEFT_OUT)}.")
         return Sheet("The stream's x, m", heads, tuple(rows), notes=tuple(notes))
 
@@ -124,8 +130,10 @@ def side_by_side(
     tables = to_dict(whole)
     streams = tables.get("stream", {})
     fall = sqrt(2.0 * (belt.pulley_radius - float(wanted.min())) / whole.gravity)
-    kept = ("title", "gravity", "material", "incoming", "particle")
+    kept = ("title", "gravity", "air_density", "material", "incoming", "particle")
     free: dict[str, Any] = {key: tables[key] for key in kept if key in tables}
+    there = {"incoming", *(kind.name for kind in whole.particles)}
+    free["pair"] = [pair for pair in tables.get("pair", ()) if there.issuperset(pair["between"])]
     rides = (belt.length + 4.0 * belt.pulley_radius) / belt.speed
     last = stream.start + stream.count / whole.rate + rides + 3.0 * fall
     free["stream"] = streams[0] if isinstance(streams, tuple) else streams

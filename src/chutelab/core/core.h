@@ -59,6 +59,8 @@ enum Phase { PART, STEP, WITHIN };
 #define TOUCHES 8
 /* Greatest number of sweeps of a jam: what they leave open rattles on, and causes the next jam after a few impacts. */
 #define JAM_SWEEPS 2000
+/* Greatest number of knots that an impact writes for a disk. */
+#define KNOTS_EACH 6
 /* Share of sqrt(g r); at a lower speed particles may fall asleep. 0.5 mm/s for r = 4 mm. */
 #define REST 2.5e-3
 /* m/s2; gravity for which bounds on speeds and times are written; for another one they are scaled by `W.pace`. */
@@ -275,7 +277,7 @@ void ride_on(Disk *d, double t, double end);
 void write_ride(int i, double until);
 int ride_knots(const Disk *d);
 
-/* steps.c */
+/* step_length.c */
 void set_step(double h);
 double bent_step(double h);
 void rate_overlaps(void);
@@ -317,10 +319,12 @@ double steered_to(const Mover *m, double t);
 
 /* joints.c */
 int are_joined(int i, int j);
-void tie_joints(void);
+double pressed_by_joints(const Contact *c);
+void add_springs(double *sums);
+
+/* joint_pull.c */
 void pull_joints(double h);
 double missed_by_joints(void);
-double pressed_by_joints(const Contact *c);
 void tug_all(int way);
 void drop_tugs(void);
 void forget_tugs(void);
@@ -328,7 +332,9 @@ void cut_step(double t);
 int is_cut(void);
 void cut_at_snaps(void);
 void end_pull(void);
-void add_springs(double *sums);
+
+/* joint_blows.c */
+void tie_joints(void);
 void strike_joints(int i, int j);
 void end_blow(void);
 void begin_answers(void);
@@ -436,17 +442,20 @@ double press_on(const Disk *d, const Surface *s, double nx, double ny);
 double chord(const Contact *c, double parted, double h);
 double follow(Contact *c, double past, double out);
 
-/* impacts.c */
+/* foresee.c */
 void foresee(int i);
 void foresee_all(void);
 void expect(int i, double due, int partner);
 int next_disk(void);
+double soft_approach(const Disk *d, double radius);
+double left_over(const Disk *d, int impacts, int surface, double radius, int sunk, double t);
+double left_between(const Disk *a, const Disk *b, double radius, double gap, double t);
+double left_by_corners(int i, int j, double gap, double t);
+
+/* impacts.c */
 void shock(int i, int j, double t);
 int is_alone(const Contact *c, const double *before);
 void hold(Disk *d, int k);
-double soft_approach(const Disk *d, double radius);
-double left_over(const Disk *d, int impacts, int surface, double radius, int sunk, double t);
-double left_by_corners(int i, int j, double gap, double t);
 void lie_down(int i);
 void was_moved(int i);
 
@@ -495,6 +504,19 @@ void start_from_frozen(Contact *c, double span);
 void note_frozen(void);
 void untell_frozen(const Contact *c, double share);
 void rouse(void);
+
+/* tracks.c */
+int release(int i, double t);
+void separate(int i);
+void leave(int i, double end);
+void stop_all(int reason);
+
+/* step.c */
+double set_gates(double t);
+void note_totals(void);
+int begin_step(void);
+int go_through(void);
+void end_step(void);
 
 /* prepare.c */
 int stretch_swings(void);

@@ -774,6 +774,20 @@ def test_a_picture_is_legible_and_says_up_to_when_it_counts(count):
             assert (told in labels) is (column == PAID)
 
 
+@pytest.mark.parametrize(
+    ("column", "says"),
+    [("ledger.power", "times the rate"), ("loads.plate.normal.peak", "plate, largest of a bin, N")],
+)
+def test_an_axis_says_all_of_what_a_column_is(column, says):
+    from chutelab.pictures.plots.studies import sweep_figure
+
+    swept = sweep(load("stream", ["stream.count=5", "run.loads=0.01"]), ["plate.angle_deg=0,5"])
+    figure = sweep_figure(swept, column)
+    figure.canvas.draw()
+    assert_legible(figure, 1.0)
+    assert says in figure.axes[0].get_ylabel().replace("\n", " ")
+
+
 def test_help_names_the_columns():
     said = " ".join(call("sweep", "--help").stdout.split())
     for name, row in COLUMNS.items():

@@ -315,7 +315,7 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
     if len(keys) > 2:
         raise ValueError(f"a picture shows one or two varied keys, not {len(keys)}")
     keys = keys or list(swept.quantities)[:1]
-    what, unit = COLUMNS[column].meaning.split(",")[0], swept.unit(column)
+    what, unit = COLUMNS[column].meaning.removesuffix(", mean"), swept.unit(column)
     what = what if what.startswith(("x ", "y ")) else what[0].upper() + what[1:]
     if column.endswith(".spread"):
         what = f"Standard deviation of {column.removesuffix('.spread')}"

@@ -175,11 +175,13 @@ def scaled(values: ArrayLike, unit: str) -> tuple[float, str]:
 def quantity(value: float, unit: str) -> str:
     """Return a value to three digits with a prefixed unit.
 
-    >>> quantity(0.0202, "J"), quantity(0.0, "J"), quantity(-1.5, "m/s")
-    ('20.2 mJ', '0 J', '−1.50 m/s')
+    >>> quantity(0.0202, "J"), quantity(0.0, "J"), quantity(-1.5, "m/s"), quantity(1252.3, "N")
+    ('20.2 mJ', '0 J', '−1.50 m/s', '1250 N')
     """
-    factor, name = scaled(float(f"{value:.2e}"), unit)
-    shown = format(factor * value, "#.3g").rstrip(".") if value else "0"
+    rounded = float(f"{value:.2e}")
+    factor, name = scaled(rounded, unit)
+    digits = "#.3g" if abs(factor * rounded) < 1000.0 else ".0f"
+    shown = format(factor * rounded, digits).rstrip(".") if value else "0"
     return f"{spoken().local(shown)} {name}".replace("-", "−")
 
 

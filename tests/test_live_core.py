@@ -10,7 +10,7 @@ from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
 from chutelab.results.loads import gather
-from chutelab.results.record import EVENT
+from chutelab.results.rows import EVENT
 from chutelab.scene import from_dict, load, parse
 from live.node import ask, needs_node, page_scene
 

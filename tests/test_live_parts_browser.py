@@ -12,7 +12,7 @@ from chutelab.machine import build
 from chutelab.pictures.live import html
 from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
 from chutelab.scene import from_dict, load
-from chutelab.scene.conflicts import HINGED, JOINTS, MOTIONS
+from chutelab.scene.look import HINGED, JOINTS, MOTIONS
 from chutelab.util.words import words
 from live.browser import DONE, axe, spot
 from shared import call

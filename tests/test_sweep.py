@@ -19,10 +19,10 @@ from chutelab.machine import build
 from chutelab.results import Kind, Recording
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import compare
-from chutelab.results.record import EVENT
 from chutelab.results.recorder import Recorder
+from chutelab.results.rows import EVENT
 from chutelab.scene import SceneError, load, parse
-from chutelab.scene.conflicts import Row
+from chutelab.scene.look import Row
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import with_unit
 from chutelab.scene.variants import Family, Judge, Vary

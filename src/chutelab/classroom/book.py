@@ -29,7 +29,7 @@ from chutelab.results.ledger import ledger
 from chutelab.results.quantities import compare, measure, predicted
 from chutelab.results.summary import facts, sheets
 from chutelab.scene import Scene
-from chutelab.scene.conflicts import of_quantities
+from chutelab.scene.formulas import of_quantities
 from chutelab.scene.overrides import Override
 from chutelab.scene.quantities import lookup, whose
 from chutelab.util.errors import InputError

@@ -19,9 +19,10 @@ from chutelab.core import REAL, AsideError, Module, Status, borrow, constants, d
 from chutelab.machine import PASSES, SWING, Machine, Pieces, chooses, hand_over, pace_of
 from chutelab.results.laws import take
 from chutelab.results.loads import gather, gather_lasting
-from chutelab.results.record import REASONS, Record
+from chutelab.results.record import Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError, read_knots
-from chutelab.scene.conflicts import JOINTS
+from chutelab.results.rows import REASONS
+from chutelab.scene.look import JOINTS
 from chutelab.util.arrays import Floats, Ints, Progress, unwatched
 
 UNTIL = {name.removeprefix("UNTIL_").lower(): one for name, one in constants("Until").items()}

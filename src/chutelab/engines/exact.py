@@ -30,8 +30,9 @@ from chutelab.core import (
 from chutelab.machine import Machine, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather
-from chutelab.results.record import EVENT, KNOT, REASONS, Record
+from chutelab.results.record import Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError, read_knots
+from chutelab.results.rows import EVENT, KNOT, REASONS
 from chutelab.util.arrays import Progress, unwatched
 
 ROUNDS = 500_000

@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from chutelab.machine import Machine
-from chutelab.results.record import Kind, Record
+from chutelab.results.record import Record
 from chutelab.results.recorder import Recorder
+from chutelab.results.rows import Kind
 from chutelab.util.arrays import Floats, Progress
 
 Guard = Callable[[Floats], Floats]

@@ -11,7 +11,7 @@ from time import perf_counter
 import numpy as np
 
 from chutelab.machine import Machine, ahead
-from chutelab.results import Recording, record
+from chutelab.results import Recording, rows
 from chutelab.results.recorder import EnoughError, StalledError
 from chutelab.scene import AnyScene, Fault, Overrides, Scene, SceneError, load
 from chutelab.scene.overrides import Override
@@ -19,7 +19,7 @@ from chutelab.util.arrays import Progress
 from chutelab.util.errors import LawWarning
 from chutelab.util.signals import ctrl_c_waits
 
-ENGINES = ("auto", *record.ENGINES)
+ENGINES = ("auto", *rows.ENGINES)
 
 
 def choose(machine: Machine, engine: str | None = None) -> str:
@@ -169,7 +169,7 @@ def _instead(machine: Machine, broken: Recording, progress: Progress | None) -> 
     If none does, the first run stands, with its laws.
     """
     said = []
-    recording, order = broken, record.ENGINES
+    recording, order = broken, rows.ENGINES
     for name in order[order.index(broken.engine) + 1 :]:
         said.append(
             f"{recording.engine} did not keep the laws of every run ({recording.laws[0].told})"

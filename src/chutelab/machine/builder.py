@@ -33,7 +33,7 @@ from chutelab.machine.parts import (
 from chutelab.machine.releases import LOOKS, RefusedError, draw
 from chutelab.machine.shapes import KINDS, Pieces
 from chutelab.scene import Fault, Plate, Scene
-from chutelab.scene.conflicts import JOINTS
+from chutelab.scene.look import JOINTS
 from chutelab.scene.units import polygon_moment
 from chutelab.scene.variants import Family
 from chutelab.util.arrays import RADIANS, Floats, Ints, Numbers, Watch, hypot, unwatched

@@ -27,17 +27,8 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from chutelab.results.record import (
-    ENTRIES,
-    EVENT,
-    KNOT,
-    PARTICLES,
-    REASONS,
-    Kind,
-    Motion,
-    Record,
-    balance,
-)
+from chutelab.results.record import Motion, Record
+from chutelab.results.rows import ENTRIES, EVENT, KNOT, PARTICLES, REASONS, Kind, balance
 
 if TYPE_CHECKING:
     from chutelab.results.fields import Fields

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.machine import Arcs, Machine, Pieces, Segments
-from chutelab.results.record import EVENT, PARTICLES, Kind, Record, hermite, kept, turned
+from chutelab.results.record import Record, hermite, kept, turned
+from chutelab.results.rows import EVENT, PARTICLES, Kind
 from chutelab.util.arrays import Bools, Floats, Ints, put
 
 TOUCH = 0.01

@@ -19,7 +19,8 @@ import numpy as np
 
 from chutelab.core import number as number_of
 from chutelab.results.arrival import Places
-from chutelab.results.record import Kind, Record
+from chutelab.results.record import Record
+from chutelab.results.rows import Kind
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.errors import InputError, MissingLibraryError
 from chutelab.util.files import whole

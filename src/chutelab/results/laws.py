@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from chutelab import core
 from chutelab.machine import Machine, hand_over
-from chutelab.results.record import EVENT, Record, balance
+from chutelab.results.record import Record
+from chutelab.results.rows import EVENT, balance
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import number
 

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.results.record import ENTRIES, PARTICLES, Record, balance, hermite, kept
+from chutelab.results.record import Record, hermite, kept
+from chutelab.results.rows import ENTRIES, PARTICLES, balance
 from chutelab.util.arrays import Floats, Ints
 from chutelab.util.tables import Sheet, Shown, number
 

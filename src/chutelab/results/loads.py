@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from chutelab.core import REAL, Module, dtype
 from chutelab.core import number as constant
 from chutelab.machine import Machine
-from chutelab.results.record import LASTING, LOAD, Record, kept
+from chutelab.results.record import Record, kept
+from chutelab.results.rows import LASTING, LOAD
 from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError, did_you_mean
 from chutelab.util.tables import Sheet, Shown, number

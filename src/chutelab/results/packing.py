@@ -29,7 +29,8 @@ from numpy.typing import NDArray
 
 from chutelab.machine import Particle
 from chutelab.results.ledger import ledger
-from chutelab.results.record import EVENT, KNOT, Record, hermite
+from chutelab.results.record import Record, hermite
+from chutelab.results.rows import EVENT, KNOT
 from chutelab.util.arrays import Bools, Floats, Ints
 
 COLUMNS = {

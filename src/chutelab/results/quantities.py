@@ -24,7 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 from chutelab.results.arrival import arrivals, first_of, firsts, never
 from chutelab.results.ledger import ledger, ledger_of_each, ledger_of_variants, worked
 from chutelab.results.loads import load
-from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
+from chutelab.results.record import Record, kept
+from chutelab.results.rows import ENTRIES, REASONS, Kind
 from chutelab.results.sensors import first_passages, reading
 from chutelab.results.wear import wear
 from chutelab.scene import Scene

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import SWING, Machine
 from chutelab.results.loads import Bins
-from chutelab.results.record import EVENT, KNOT, LASTING, LOAD, REASONS, TOTAL, Kind, Record
+from chutelab.results.record import Record
+from chutelab.results.rows import EVENT, KNOT, LASTING, LOAD, REASONS, TOTAL, Kind
 from chutelab.util.arrays import Bools, Floats, Ints, put, sorted_by
 
 

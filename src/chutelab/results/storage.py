@@ -24,18 +24,8 @@ from numpy.typing import NDArray
 from chutelab.machine import SWING, build
 from chutelab.results import packing
 from chutelab.results.loads import borne, need_loads
-from chutelab.results.record import (
-    ENGINES,
-    ENTRIES,
-    EVENT,
-    KNOT,
-    LASTING,
-    LOAD,
-    REASONS,
-    TOTAL,
-    Kind,
-    Record,
-)
+from chutelab.results.record import Record
+from chutelab.results.rows import ENGINES, ENTRIES, EVENT, KNOT, LASTING, LOAD, REASONS, TOTAL, Kind
 from chutelab.results.sensors import need_sensors, sensed
 from chutelab.results.wear import KEYS, check_coefficients, touched
 from chutelab.scene import from_dict

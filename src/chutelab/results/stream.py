@@ -16,7 +16,8 @@ import numpy as np
 
 from chutelab.results.arrival import CARRIED, Places, arrivals, fates
 from chutelab.results.quantities import each, measure
-from chutelab.results.record import ENTRIES, Record
+from chutelab.results.record import Record
+from chutelab.results.rows import ENTRIES
 from chutelab.results.sensors import QUANTILES
 from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.units import with_unit

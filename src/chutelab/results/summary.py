@@ -21,7 +21,8 @@ from chutelab.results.ledger import Ledger, ledger
 from chutelab.results.loads import sheet as load_sheet
 from chutelab.results.loads import told as loads_told
 from chutelab.results.quantities import column, compare, each, first, predicted, prediction
-from chutelab.results.record import REASONS, Kind, Record
+from chutelab.results.record import Record
+from chutelab.results.rows import REASONS, Kind
 from chutelab.results.sensors import readings
 from chutelab.results.sensors import sheet as sensor_sheet
 from chutelab.results.stream import FLOW, crowd, steady

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.results.ledger import ledger
-from chutelab.results.record import Kind, Record, hermite, kept
+from chutelab.results.record import Record, hermite, kept
+from chutelab.results.rows import Kind
 from chutelab.util.arrays import Floats, Ints
 from chutelab.util.errors import InputError, did_you_mean
 from chutelab.util.tables import Sheet, Shown, number

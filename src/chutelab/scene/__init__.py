@@ -26,7 +26,8 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from chutelab.scene.conflicts import JOINTS, ConflictError, Look, conflicts
+from chutelab.scene.conflicts import ConflictError, conflicts
+from chutelab.scene.look import JOINTS, Look
 from chutelab.scene.materials import Particle
 from chutelab.scene.messages import faults_of, live_faults
 from chutelab.scene.overrides import Override, apply, joined, schema, sized

@@ -3,23 +3,22 @@
 Every rule reports a fault only if a comparison is *true*. A `Look` returns NaN for a key that is
 itself at fault, and no comparison with NaN is true. So the rules work on a partly invalid scene,
 and all faults of a file come in one message. Rules about one row of a table are data, `RULES`; the
-live page gets those that it needs. No page may evaluate text, so `tree` turns a formula into lists
-for a small evaluator (``pictures/live/assets/formula.ts``).
+live page gets those that it needs.
 """
 
 from __future__ import annotations
 
-import ast
 import math
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from functools import cache, partial
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from types import CodeType
 from typing import Any, Final
 
+from chutelab.scene.formulas import compiled
+from chutelab.scene.look import ALWAYS, JOINTS, LIST, MOTIONS, SURFACES, WAITS, Look, Row
 from chutelab.scene.materials import presets
 from chutelab.scene.quantities import REGISTRY, lookup, suggestion, whose
 from chutelab.scene.units import (
@@ -37,6 +36,10 @@ THEORY: Final = "theory"
 UNPROMISED: Final = "none"
 """Allowed words for the value and a tolerance of an expectation."""
 
+LEAST_VIEW: Final = 1e-6
+"""Least width and height of a ``[view]``, m: smaller ones vanish in rounding far from the
+origin."""
+
 
 class ConflictError(ValueError):
     """Passes the faults of a rule through Pydantic's validation."""
@@ -44,225 +47,6 @@ class ConflictError(ValueError):
     def __init__(self, faults: Sequence[Fault]) -> None:
         super().__init__("; ".join(str(fault) for fault in faults))
         self.faults = list(faults)
-
-
-EITHER: Final = {"particle": "particles", "plate": "plates", "stream": "streams"}
-"""Tables that a file has once, ``[stream]``, or several times, ``[[stream]]``; lists in code."""
-
-ALWAYS: Final = ("particle", "stream", "run")
-"""Tables that a scene has even if they are not written."""
-
-JOINTS: Final = ("string", "rod", "spring", "pin")
-"""Tables of joints between particles, or with points; as `Tie` in layout.h."""
-
-MOTIONS: Final = ("turn", "shake", "travel")
-"""Keys by which the motion of a surface is prescribed."""
-
-HINGED: Final = (
-    "hinge", "mass", "inertia", "spring", "rest_deg", "damper", "stops_deg", "motor",
-)  # fmt: skip
-"""Keys of a hinge."""
-
-WAITS = ("opens_when", "closes_when", "starts_when")
-"""Keys of triggers, which wait until another surface is touched."""
-
-NO_MACHINE: Final = ("sensor", "expect", "view", "live")
-"""Tables that do not concern the machine."""
-
-LEAST_VIEW: Final = 1e-6
-"""Least width and height of a ``[view]``, m: smaller ones vanish in rounding far from the
-origin."""
-
-LIST: Final = (list, tuple)
-
-SURFACES: Final = ("plate", "conveyor", "surface")
-"""Lists of tables that are surfaces with names of their own."""
-
-
-OPERATORS: Final[dict[type[ast.AST], str]] = {
-    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**",
-    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
-    ast.And: "and", ast.Or: "or",
-}  # fmt: skip
-
-
-class _Dotted(ast.NodeTransformer):
-    """Turns a quantity such as ``landing.x`` into a single name."""
-
-    def visit_Attribute(self, node: ast.Attribute) -> ast.Name:
-        return ast.Name(ast.unparse(node), ast.Load())
-
-
-def of_quantities(formula: str) -> ast.Expression:
-    """Parse a formula of quantities, each of which becomes one name."""
-    parsed: ast.Expression = _Dotted().visit(ast.parse(formula.strip(), mode="eval"))
-    return ast.fix_missing_locations(parsed)
-
-
-@cache
-def tree(formula: str, *, dotted: bool = False) -> Any:
-    """Return a formula as nested lists: the name of an operation, then its operands.
-
-    Numbers and truth values stand for themselves, and a text is a name.
-
-    Raises a `ValueError` for anything that pages cannot evaluate.
-
-    Examples
-    --------
-    >>> tree("0.5 * m * v0**2 > -1")
-    ['compare', ['*', ['*', 0.5, 'm'], ['**', 'v0', 2]], '>', ['-', 1]]
-    >>> tree("transfer(**throw, rebound='as-printed').v3x")
-    ['.', ['call', 'transfer', [], [['throw'], ['rebound', ['text', 'as-printed']]]], 'v3x']
-
-    With `dotted`, quantities are names:
-
-    >>> tree("1000 * ledger.belt_work", dotted=True)
-    ['*', 1000, 'ledger.belt_work']
-    """
-    read = of_quantities(formula) if dotted else ast.parse(formula.strip(), mode="eval")
-    return _of(read.body)
-
-
-def _of(node: ast.expr) -> Any:
-    match node:
-        case ast.Constant(bool() | int() | float() as value):
-            return value
-        case ast.Constant(str(text)):
-            return ["text", text]
-        case ast.Name(name):
-            return name
-        case ast.UnaryOp(ast.USub(), operand):
-            return ["-", _of(operand)]
-        case ast.UnaryOp(ast.Not(), operand):
-            return ["not", _of(operand)]
-        case ast.BoolOp(operator, operands):
-            return [OPERATORS[type(operator)], *map(_of, operands)]
-        case ast.BinOp(left, operator, right) if type(operator) in OPERATORS:
-            return [OPERATORS[type(operator)], _of(left), _of(right)]
-        case ast.Compare(left, operators, others) if {*map(type, operators)} <= {*OPERATORS}:
-            parts = zip(operators, others, strict=True)
-            rest = [part for one, other in parts for part in (OPERATORS[type(one)], _of(other))]
-            return ["compare", _of(left), *rest]
-        case ast.Attribute(value, name):
-            return [".", _of(value), name]
-        case ast.Subscript(value, index):
-            return ["item", _of(value), _of(index)]
-        case ast.List(items):
-            return ["list", *map(_of, items)]
-        case ast.Lambda(ast.arguments() as taken, body):
-            return ["lambda", [one.arg for one in taken.args], _of(body)]
-        case ast.Call(function, arguments, keywords):
-            # An unpacked table (**table) has no name.
-            named = [[one.arg, _of(one.value)] if one.arg else [_of(one.value)] for one in keywords]
-            return ["call", _of(function), [*map(_of, arguments)], named]
-    raise ValueError(f"pages do not know {ast.unparse(node)!r}")
-
-
-class Row:
-    """A table, or one of several, valid or not; keys that are not written have their defaults."""
-
-    def __init__(self, look: Look, table: str, number: int) -> None:
-        found: Any = look.document.get(table)
-        several = isinstance(found, LIST)
-        if several:
-            found = found[number] if number < len(found) else None
-        self.head = f"{table}[{number}]" if several else table
-        self.content: dict[str, Any] = found if isinstance(found, dict) else {}
-        self._look = look
-        self._defaults = look.defaults[table]
-        self._there = table in ALWAYS or look.has(table)
-
-    def path(self, key: str) -> str:
-        """Return the full path of a key."""
-        return f"{self.head}.{key}"
-
-    def given(self, key: str) -> bool:
-        """Whether the key is written, valid or not."""
-        return self.content.get(key) is not None
-
-    def sound(self, key: str = "") -> bool:
-        """Whether a key, or the whole table, is valid."""
-        return self._look.sound(self.path(key) if key else self.head)
-
-    def __getitem__(self, key: str) -> Any:
-        """Return the value of a key, or its default; NaN if it is invalid or its table absent.
-
-        A name in code, such as `from_`, is accepted for the key.
-        """
-        key = key.rstrip("_")
-        path, look = f"{self.head}.{key}", self._look
-        look.asked.add(path)
-        if look.faulty and not look.sound(path):
-            return math.nan
-        value = self.content.get(key)
-        if value is not None:
-            return value
-        return self._defaults[key] if self._there else math.nan
-
-    def fault(self, key: str, allowed: str) -> Fault:
-        """Report that a key has a value that it should not have."""
-        return Fault(self.path(key), self[key], allowed)
-
-    def missing(self, key: str, wanted: str) -> Fault:
-        """Report that a key is missing."""
-        return Fault(self.path(key), MISSING, wanted)
-
-
-class Look:
-    """Read-only view of a scene's tables, as in its file or dumped, valid or not.
-
-    `defaults` has the defaults of the keys of each table; `faulty` the full paths of invalid keys;
-    `asked` the keys that were read, on which alone the rules can depend.
-    """
-
-    def __init__(
-        self,
-        document: Mapping[str, Any],
-        defaults: Mapping[str, Mapping[str, Any]],
-        faulty: Collection[str] = (),
-    ) -> None:
-        self.document = document
-        self.defaults = defaults
-        self.faulty = faulty
-        self.asked: set[str] = set()
-        self._rows: dict[str, list[Row]] = {}
-
-    def sound(self, path: str) -> bool:
-        """Whether the key, its table and everything inside it are valid."""
-        return not self.faulty or not any(
-            f == path
-            or f.startswith((path + ".", path + "["))
-            or path.startswith((f + ".", f + "["))
-            for f in self.faulty
-        )
-
-    def has(self, table: str) -> bool:
-        """Whether the table exists, valid or not; a misspelt one counts as invalid."""
-        return self.document.get(table) not in (None, (), []) or table in self.faulty
-
-    def row(self, table: str) -> Row:
-        """Return a table, or the first of several."""
-        return Row(self, table, 0)
-
-    def rows(self, table: str, least: int = 0) -> list[Row]:
-        """Return all rows of a table; at least so many."""
-        if table not in self._rows:
-            found = self.document.get(table)
-            one = isinstance(found, dict) and table in EITHER
-            count = len(found) if isinstance(found, LIST) else int(one)
-            self._rows[table] = [Row(self, table, number) for number in range(count)]
-        return self._rows[table] or [Row(self, table, number) for number in range(least)]
-
-    @property
-    def gravity(self) -> Any:
-        """The scene's gravity, valid or not; None if it is not written."""
-        self.asked.add("gravity")
-        return self.document.get("gravity")
-
-    @property
-    def damps(self) -> bool:
-        """Whether there is a damping plate."""
-        return any(plate.given("distance") for plate in self.rows("plate"))
 
 
 RULES: Final[dict[str, list[list[str]]]] = {}
@@ -273,12 +57,6 @@ for tables, written in tomllib.loads(
 ).items():
     for name in tables.split():
         RULES.setdefault(name, []).extend(written)
-
-
-@cache
-def compiled(formula: str) -> CodeType:
-    """Return a formula for `eval`."""
-    return compile(formula, f"<{formula}>", "eval")
 
 
 class _Names(dict[str, Any]):

@@ -12,7 +12,8 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from chutelab.scene.conflicts import ALWAYS, EITHER, NO_MACHINE, ConflictError
+from chutelab.scene.conflicts import ConflictError
+from chutelab.scene.look import ALWAYS, EITHER, NO_MACHINE
 from chutelab.scene.overrides import (
     Override,
     apply,

@@ -19,7 +19,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from chutelab.scene.conflicts import EITHER
+from chutelab.scene.look import EITHER
 from chutelab.scene.schema import TABLES, SceneTables, to_dict
 from chutelab.scene.units import WORDS, read_any, size_in
 from chutelab.util.errors import MISSING, Fault, InputError, printable

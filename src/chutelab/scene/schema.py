@@ -9,7 +9,8 @@ from typing import Annotated, Any, Final, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
-from chutelab.scene.conflicts import EITHER, JOINTS, ConflictError, Look, conflicts, stream_name
+from chutelab.scene.conflicts import ConflictError, conflicts, stream_name
+from chutelab.scene.look import EITHER, JOINTS, Look
 from chutelab.scene.materials import Material, Pair, Particle, presets
 from chutelab.scene.tables import (
     Conveyor,

@@ -9,7 +9,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from chutelab.scene.conflicts import UNPROMISED, ConflictError, Look, rules_of
+from chutelab.scene.conflicts import UNPROMISED, ConflictError, rules_of
+from chutelab.scene.look import Look
 from chutelab.scene.units import (
     LARGEST,
     MOST_PARTICLES,

@@ -16,7 +16,8 @@ from typing import Any, Final
 import numpy as np
 
 from chutelab.scene import Scene, SceneError, from_dict, plain, to_dict
-from chutelab.scene.conflicts import EITHER, NO_MACHINE, Check, Look, checks
+from chutelab.scene.conflicts import Check, checks
+from chutelab.scene.look import EITHER, NO_MACHINE, Look
 from chutelab.scene.materials import Material, Particle
 from chutelab.scene.overrides import (
     Override,

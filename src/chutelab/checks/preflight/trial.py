@@ -18,8 +18,8 @@ from chutelab.engines.exact import ROUNDS
 from chutelab.engines.simulation import follow
 from chutelab.machine import Machine, build
 from chutelab.results import EVENT, KNOT, REASONS, Recording
-from chutelab.results.record import LOAD
 from chutelab.results.recorder import EnoughError, StalledError
+from chutelab.results.rows import LOAD
 from chutelab.results.sensors import readings
 from chutelab.results.summary import air_drag, stopped
 from chutelab.results.wear import touched

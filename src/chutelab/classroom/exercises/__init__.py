@@ -54,7 +54,7 @@ from chutelab.classroom.exercises.judging import (
     number_of,
     number_with_unit,
 )
-from chutelab.scene.conflicts import tree
+from chutelab.scene.formulas import tree
 from chutelab.util.errors import InputError
 from chutelab.util.words import words
 

@@ -27,7 +27,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final
 
-from chutelab.scene.conflicts import compiled
+from chutelab.scene.formulas import compiled
 from chutelab.theory import transfer
 from chutelab.util.words import words
 

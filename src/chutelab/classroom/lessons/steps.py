@@ -16,7 +16,7 @@ from pydantic import BeforeValidator, Field
 
 from chutelab.classroom.lessons.texts import parser
 from chutelab.scene import MISSING, Fault, Scene, SceneError
-from chutelab.scene.conflicts import of_quantities, tree
+from chutelab.scene.formulas import of_quantities, tree
 from chutelab.scene.overrides import value_at
 from chutelab.scene.quantities import lookup, suggestion, whose
 from chutelab.scene.units import Table, Text, Whole, flat
@@ -242,7 +242,7 @@ def data_of(steps: Sequence[Step], controls: tuple[str, ...], said: Words) -> li
     """Return steps as plain data for the JSON of a page.
 
     Texts are HTML with MathML, heads and choices without paragraphs; `controls` of a step are all
-    keys that can be changed in it. The value of a column is a formula as `scene.conflicts.tree`
+    keys that can be changed in it. The value of a column is a formula as `scene.formulas.tree`
     returns it, in which a quantity is a name with dots. The teacher's parts are left out.
     """
     return [

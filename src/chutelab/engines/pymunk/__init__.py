@@ -20,8 +20,9 @@ from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.pymunk.shared import Shared
 from chutelab.engines.pymunk.world import World
 from chutelab.machine import Machine
-from chutelab.results.record import REASONS, Record
+from chutelab.results.record import Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
+from chutelab.results.rows import REASONS
 from chutelab.util.arrays import Progress
 
 LOOK, SLICE = 64, 0.05

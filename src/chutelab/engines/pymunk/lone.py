@@ -22,8 +22,8 @@ from pymunk import Vec2d
 from chutelab.engines.pymunk.faces import Face, Flight
 from chutelab.engines.pymunk.world import LOW, PARTICLE, SHORT, SURFACE, Carriage, World
 from chutelab.machine import Machine
-from chutelab.results.record import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder, StalledError, Tracks
+from chutelab.results.rows import REASONS, Kind
 from chutelab.util.arrays import Progress, bisected
 
 WEDGED = 1000

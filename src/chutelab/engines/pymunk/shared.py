@@ -32,8 +32,8 @@ from chutelab.engines.pymunk.shapes import Shapes
 from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Carriage, World
 from chutelab.machine import SWING, Machine
 from chutelab.results.loads import Bins
-from chutelab.results.record import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder, Tracks
+from chutelab.results.rows import REASONS, Kind
 from chutelab.util.arrays import Floats, Ints, Progress
 
 SOON = 1e-9

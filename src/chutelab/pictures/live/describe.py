@@ -8,7 +8,9 @@ from typing import Any, Final
 from chutelab.engines.simulation import uncornered, unjoined
 from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError, load, to_dict
-from chutelab.scene.conflicts import EITHER, JOINTS, RULES, tree
+from chutelab.scene.conflicts import RULES
+from chutelab.scene.formulas import tree
+from chutelab.scene.look import EITHER, JOINTS
 from chutelab.scene.materials import VALUES, presets
 from chutelab.scene.messages import LISTS
 from chutelab.scene.overrides import limits_of, rule_at

@@ -1,4 +1,4 @@
-// Formulas of rules and exercises: trees made by Python's parser (`scene/conflicts.py`), and
+// Formulas of rules and exercises: trees made by Python's parser (`scene/formulas.py`), and
 // functions of exercises.
 
 import { fixedText } from "./decimal.ts";

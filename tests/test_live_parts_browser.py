@@ -461,6 +461,20 @@ def test_a_ball_that_is_under_way_is_caught_and_thrown_as_python_does(shown, sce
     expect(page.locator("#energy tr[data-id=push_work]")).to_be_hidden()
 
 
+def test_after_its_end_a_run_takes_a_ball_and_escape_takes_a_refusal_away(shown):
+    page = shown("see-saw")  # it ends at 0.3 s
+    page.evaluate("chutelab.lab.seek(0.3)")
+    page.click("#tool-add")
+    page.click("#part-ball")
+    page.mouse.click(*spot(page, 0.5, 0.15))
+    expect(page.locator("#fault")).to_be_hidden()
+    assert [one.get("start", 0) for one in given(page)["stream"]] == [0, 0, 0]
+    page.evaluate("chutelab.lab.change({ 'particle.light.radius': -1 })")
+    expect(page.locator("#fault")).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(page.locator("#fault")).to_be_hidden()
+
+
 def test_a_hinge_is_pushed_in_a_running_run_by_hand_and_by_keys_as_python_does(shown):
     """Work and heat of a flap with a ball on it are in the ledger, in the bits of Python's run."""
     flap = {"name": "flap", "from": [0.0, 0.0], "to": [0.4, 0.0], "hinge": [0.0, 0.0],

@@ -589,7 +589,9 @@ class Bench {
   put(part: Part, points: Place[]) {
     const { lab } = this, { given, machine } = lab;
     if (!given) return;
-    const start = machine?.interact ? roundTo(Math.max(0, lab.t), 1e-3) : 0;
+    // A ball falls into a run that goes on; after its end it belongs to the next run.
+    const goesOn = machine?.interact && !(lab.t >= given.run?.until);
+    const start = goesOn ? roundTo(Math.max(0, lab.t), 1e-3) : 0;
     const { unit, scale } = this.stage.view, { parts, tables } = lab.data;
     const reach = CLICK_REACH / scale, [ball] = parts.filter((one: Part) => one.part === "ball");
     const changed = isJoint(part.table)

@@ -253,11 +253,8 @@ class Fields {
 
   /** Go back to the present value. */
   giveUp(key: string) {
-    const { lab } = this, its = this.entries.get(key);
-    lab.asked = "";
-    lab.fault = null;
-    lab.tell("scene");
-    its?.input.focus();
+    this.lab.dismiss();
+    this.entries.get(key)?.input.focus();
   }
 }
 

@@ -39,6 +39,7 @@ function listenToKeys(
   const always: Record<string, () => void> = {
     "ctrl+z": () => lab.undo(), "ctrl+shift+z": () => lab.redo(), "ctrl+y": () => lab.redo(),
     Escape: () => {
+      if (lab.fault) lab.dismiss();
       if (lab.hand) lab.drop();
       else if (bench.mode || bench.moving) bench.set(null);
       else bench.inspector.choose();

@@ -138,6 +138,13 @@ class Lab {
     this.tell("scene");
   }
 
+  /** Take away why something was not possible. */
+  dismiss() {
+    this.asked = "";
+    if (!this.engine.broken) this.fault = null;
+    this.tell("scene");
+  }
+
   /** Run from a time on, with the particles present then: a crowd goes on while it is changed.
    * Others start again, since their runs take no time, as do scenes with joints, which are tied at
    * the release.

@@ -938,6 +938,9 @@ def test_the_empty_page_and_the_card_are_accessible_and_fingers_hit(empty, size,
     page = empty("de", viewport=viewport, color_scheme=scheme, has_touch=touch, is_mobile=touch)
     assert axe(page) == []
     assert page.evaluate("document.documentElement.scrollWidth") == size[0]
+    if touch and size[0] < 720:
+        head = page.locator("header").bounding_box()
+        assert (head["x"], head["width"]) == (0, size[0]), "from edge to edge, as later"
     page.click("#begin")
     page.evaluate(DONE)
     page.evaluate("chutelab.bench.inspector.choose('incoming')")

@@ -7,7 +7,7 @@ machine; of the same code this count does not, and 1,000 in a box scatter by 0.3
 seed. It is no time: an operation on four numbers counts once, and what memory costs is not in it.
 The cases are the runs of `against.py`, `box` (1,000 disks pour into a box for 2 s), `squares` and
 `rounds` (300 boxes, and as many disks of their area, poured into a bin, in a mean of twelve draws),
-and 600 variants of `spoon` by speed and by friction.
+and 600 variants of `spoon` by speed, friction and restitution.
 """
 
 import sys
@@ -28,7 +28,8 @@ ALL = 1 << 62
 """Operations that a store may run."""
 
 VARIED = {"spoon, speed": ("incoming.speed", 1.5, 3.0),
-          "spoon, friction": ("surface.spoon.friction", 0.0, 0.5)}  # fmt: skip
+          "spoon, friction": ("surface.spoon.friction", 0.0, 0.5),
+          "spoon, restitution": ("surface.spoon.restitution", 0.0, 0.5)}  # fmt: skip
 
 HALF, WIDE, MANY, DRAWS = 0.009, 0.1 * 5.0**0.5, 300, 12
 SHAPES = {"squares": {"shape": "box", "size": [2.0 * HALF, 2.0 * HALF]},

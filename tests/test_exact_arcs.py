@@ -1,5 +1,6 @@
 """The event-driven engine on arcs, against differential equations integrated here."""
 
+from decimal import Decimal, localcontext
 from math import atan2, cos, hypot, pi, sin, sqrt
 
 import numpy as np
@@ -191,3 +192,111 @@ def test_what_is_larger_than_the_inside_of_an_arc_meets_its_ends(engine, off):
     end = run.track(0)[-1]
     assert REASONS[run.ended[0]] == ended
     np.testing.assert_allclose(end["position"], [0.0, sqrt(0.3**2 - 0.2**2)], atol=off)
+
+
+def hops(place, velocity, length, restitution, friction, share, least):
+    """Fly inside a circle and rebound, with 40 digits, down to rebounds slower than `least`.
+
+    Yield time, velocity and r ω after each impact. The gap falls to 0 at a root of
+    |p + v t + g t²/2|² = L²; an impact follows Newton and Coulomb, with 1/share - 1 = m r²/I.
+    """
+    with localcontext() as context:
+        context.prec = 40
+        x, y, vx, vy, length = map(Decimal, (*place, *velocity, length))
+        e, friction, share = map(Decimal, (restitution, friction, share))
+        g, t, z, rebound = Decimal(G), Decimal(0), Decimal(0), Decimal(1)
+
+        def out(time):
+            return (x + vx * time) ** 2 + (y + (vy - g * time / 2) * time) ** 2 - length**2
+
+        while rebound > least:
+            high = rebound / 20 / g
+            while out(high) <= 0:
+                low, high = high, high * Decimal("1.05")
+            while high - low > high * Decimal("1e-30"):
+                middle = (low + high) / 2
+                low, high = (low, middle) if out(middle) > 0 else (middle, high)
+            x, y, vy = x + vx * low, y + (vy - g * low / 2) * low, vy - g * low
+            t += low
+            far = (x * x + y * y).sqrt()
+            x, y = x * length / far, y * length / far
+            nx, ny = -x / length, -y / length
+            approach, pace = -(vx * nx + vy * ny), vx * ny - vy * nx
+            rebound, most = e * approach, friction * (1 + e) * approach
+            push = min(max(-share * (pace + z), -most), most)
+            z += (1 / share - 1) * push
+            vx = rebound * nx + (pace + push) * ny
+            vy = rebound * ny - (pace + push) * nx
+            yield float(t), (float(vx), float(vy)), float(z)
+
+
+@pytest.mark.parametrize("spin", [False, True])
+@pytest.mark.parametrize(("friction", "restitution"), [(0.0, 0.5), (0.1, 0.7), (0.4, 0.3)])
+def test_ever_lower_hops_in_a_bowl_are_those_of_forty_digits(friction, restitution, spin):
+    start, radius = ([-0.5, -0.3], [1.0, 0.5]), 0.02
+    wanted = [*hops(*start, 1.0 - radius, restitution, friction, 1 / 3 if spin else 1.0, 1e-9)]
+    arc = bowl(friction=friction, restitution=restitution)
+    found = exact.run(bent(at(*start, radius=radius, spin=spin, until=6.0), arc)).select(
+        Kind.IMPACT
+    )
+    assert len(found) >= len(wanted) - 1 > 15
+    times, after, rims = zip(*wanted, strict=True)
+    some = slice(len(wanted) - 1)
+    np.testing.assert_allclose(found["t"][some], times[some], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(found["velocity_after"][some], after[some], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(radius * found["omega_after"][some], rims[some], rtol=0, atol=1e-13)
+
+
+LARGE = 0.1
+HOP = ([-0.3, -0.75], [0.8, -0.5])
+"""A throw of a disk of this radius into the bowl: it hops less far than it is wide."""
+
+
+def first_hop():
+    """Times of the rebound with ε = 0.3 from the bowl, and of the next; place and velocity."""
+    (t, velocity, _), (back, *_) = list(hops(*HOP, 1.0 - LARGE, 0.3, 0.0, 1.0, 0.01))[:2]
+    place = [HOP[0][0] + 0.8 * t, HOP[0][1] - (0.5 + G * t / 2.0) * t]
+    return t, back, np.array(place), np.array(velocity)
+
+
+def after(time, place, velocity):
+    """Return place and velocity of a flight."""
+    fallen = np.array([0.0, G * time])
+    return place + (velocity - 0.5 * fallen) * time, velocity - fallen
+
+
+@pytest.mark.parametrize("deep", [-1e-9, 1e-9, 1e-3])
+def test_a_hop_ends_where_it_meets_the_end_of_a_wall(deep):
+    """It hangs so deep into the middle of the first hop, from above."""
+    t, back, *start = first_hop()
+    place, velocity = after(0.5 * (back - t), *start)
+    tip = place + (LARGE - deep) * np.array([-velocity[1], velocity[0]]) / hypot(*velocity)
+    built = at(*HOP, face("wall", tip, (tip[0], 1.0)), radius=LARGE)
+    hits = exact.run(bent(built, bowl(restitution=0.3))).select(Kind.IMPACT)
+    assert hits["t"][0] == pytest.approx(t, rel=1e-13)
+    assert (hits["surface"][1] != hits["surface"][0]) == (deep > 0.0)
+    if deep > 0.0:
+        assert hypot(*(hits["position"][1] - tip)) == pytest.approx(LARGE, rel=1e-12)
+        assert t < hits["t"][1] < 0.5 * (t + back)
+
+
+def test_a_hop_ends_at_a_wall():
+    t, _, place, velocity = first_hop()
+    ahead = 0.01
+    wall = place[0] + LARGE + ahead
+    built = at(*HOP, face("wall", (wall, -2.0), (wall, 2.0)), radius=LARGE)
+    hit = exact.run(bent(built, bowl(restitution=0.3))).select(Kind.IMPACT, surface="wall")[0]
+    assert hit["t"] == pytest.approx(t + ahead / velocity[0], rel=1e-13)
+
+
+def test_a_hop_may_lead_past_the_end_of_an_arc():
+    """The arc ends just before it would be back; it meets the end a little later."""
+    t, back, *start = first_hop()
+    place, _ = after(back - t, *start)
+    over = atan2(*place[::-1]) + pi - 0.01
+    run = exact.run(bent(at(*HOP, radius=LARGE), bowl(restitution=0.3, extent=over)))
+    first, second = run.select(Kind.IMPACT)[:2]
+    assert first["t"] == pytest.approx(t, rel=1e-13)
+    away = second["position"] - [-cos(over), -sin(over)]
+    assert hypot(*away) == pytest.approx(LARGE, rel=1e-12)
+    assert second["t"] > back

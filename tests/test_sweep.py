@@ -340,6 +340,25 @@ def test_what_members_share_is_to_the_bit_what_each_has_alone(scene, key, gate):
         assert own == [event for event in events if event[1] // 4 == row]
 
 
+def test_of_many_impacts_in_a_row_a_family_keeps_six():
+    """Rows tell them from five at most; a run alone keeps all, and neither loses what follows."""
+    block = block_of(parse(SEVERAL), ["surface.bowl.restitution=0.2,0.5"])
+    (family,) = (one.events.copy() for _, one in runs(block))
+    alone = [one for _, one in runs(block, apart=True)]
+    for row, one in enumerate(alone):
+        own, left, met = one.events, [], dict.fromkeys(range(4), (0, None))
+        for event in own[np.lexsort((own["t"], own["particle"]))]:
+            count, surface = met[event["particle"]]
+            again = event["kind"] == Kind.IMPACT and event["surface"] == surface
+            count = count + 1 if again else 1
+            met[event["particle"]] = count, event["surface"] if event["kind"] == Kind.IMPACT else -2
+            if count <= 6:
+                left.append((event["t"], event["particle"] + 4 * row, event["kind"]))
+        assert len(own) > len(left)
+        mine = family[family["particle"] // 4 == row]
+        assert [*zip(mine["t"], mine["particle"], mine["kind"], strict=True)] == left
+
+
 def test_one_that_the_exact_engine_cannot_follow_spoils_no_other(monkeypatch):
     # A spinning disk that a belt presses into a corner: pymunk follows it.
     corner = """

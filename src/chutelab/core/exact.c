@@ -63,16 +63,35 @@ static void drop(void) {
     let_go(NONE, 0, 0, NONE);
 }
 
+/* Whether the way of a particle that hops is so short since a knot that a cubic along a circle would be accurate. */
+static int is_near(const Knot *k) {
+    const Obstacle *o = O.all + A.left;
+    return o->met == FACE || 2.0 * length_of(A.x - k->x, A.y - k->y) < step_angle() * fabs(o->rho);
+}
+
 APART static void fly(void) {
     const double *box = A.given->exit_box, *up = A.given->up;
     Motion m = motion_of(0.0, -A.given->gravity);
-    double leaves = INFINITY;
+    int again = A.hopped == A.rounds - 1;
+    if (!again) A.free = 0.0;
+    double stops = A.given->stop - A.age, leaves = INFINITY, time = hop(&m, stops);
+    if (time < stops) {
+        A.hopped = A.rounds;
+        count_idle(time);
+        move(&m, time);
+        tell_here();
+        /* Of small hops in a row a family keeps the knots of the last one. */
+        if (E.brief && again && is_near(E.knots + E.knot_count - 3)) E.knot_count -= 2;
+        write_knot();
+        strike(A.left, A.left_side);
+        return;
+    }
     for (int n = 0; n < 2; n++) {
         double right = n ? -up[0] : up[1], above = up[n], pull = above * m.ay;
         double place = right * A.x + above * A.y, speed = right * A.vx + above * A.vy;
         leaves = MIN(leaves, MIN(when(place - box[n], speed, pull), when(box[2 + n] - place, -speed, -pull)));
     }
-    double stops = A.given->stop - A.age, dt = MIN(leaves, stops);
+    double dt = MIN(leaves, stops);
     int obstacle, side, hits = first_contact(&m, &dt, &obstacle, &side);
     count_idle(dt);
     move(&m, dt);

@@ -143,6 +143,8 @@ typedef struct {
     int order;              /* ... and how many of the leading coefficients of the gap to it are zero: 1 after a
                                rebound, 2 when leaving tangentially, 3 when lifting off a circle */
     int joint;              /* set that it leaves as a whole, tangentially, or -1 */
+    double free;            /* m; length of path on which it can meet only what it left, see `hop` */
+    int hopped;             /* its latest round that was a hop */
     int idle, crawls;       /* consecutive events that took no time; that were slow, between two obstacles */
     double angle;           /* rad; of a ride round a circle ... */
     Bound bounds[2];        /* ... and its ends, backwards and forwards */
@@ -235,6 +237,7 @@ double polynomial(const double *c, int count, double t);
 int spans(const Obstacle *o, double x, double y);
 int is_reached(int circle, double x, double y, int epoch);
 int first_contact(const Motion *m, double *until, int *obstacle, int *side);
+double hop(const Motion *m, double until);
 void find_bounds(int circle, int side, double phi, int epoch, Bound *found);
 
 /* exact_ride.c */

@@ -165,6 +165,15 @@ static double rub(const Touch *c, double slip, double normal, double *change, do
     return push;
 }
 
+/* Whether the latest events are many impacts of the particle on a surface, of which a family does not keep more. */
+static int is_one_of_many(int surface) {
+    for (int n = 1; n <= MANY_TOUCHES; n++) {
+        const Event *e = E.events + E.event_count - n;
+        if (!E.brief || E.event_count < n || e->disk != E.lone || e->kind != IMPACT || e->surface != surface) return 0;
+    }
+    return 1;
+}
+
 /* An impact: change the velocities, book the energies, write event and knot. */
 static void resolve_impact(const Touch *c, double approach, double rebound, int lands) {
     double vx = A.vx, vy = A.vy, spin = A.turns ? A.z / A.given->radius : 0.0, mass = A.given->mass;
@@ -181,6 +190,7 @@ static void resolve_impact(const Touch *c, double approach, double rebound, int 
     write_knot();
     if (!(approach > NEGLIGIBLE * A.given->pace || push != 0.0 || lands)) return;
     E.contacts++;
+    if (is_one_of_many(c->surface)) return;
     record_event(lands ? LANDING : IMPACT, c->surface);
     Event *e = E.events + E.event_count - 1;
     e->before[0] = vx, e->before[1] = vy, e->before[2] = spin;

@@ -25,6 +25,8 @@
 #define HALVINGS 20
 #define TURNINGS 4
 #define MOST_ROOTS 4
+/* Share of the slope of a straight line by which a gap may differ from it, and has one zero all the same. */
+#define STRAIGHT 0.25
 /* rad; an obstacle this near to the present angle is met now, although by rounding it may be behind. */
 #define NOW 2e-11
 /* In `touch`; circles whose centres and radii differ by no more are at the same place. */
@@ -365,6 +367,61 @@ int first_contact(const Motion *m, double *until, int *obstacle, int *side) {
     if (circle == NONE || !(soonest < *until || (!hits && soonest == *until))) return hits;
     *until = soonest, *obstacle = circle, *side = 0;
     return 1;
+}
+
+/* The distance to the box of a particle's centre in contact with an obstacle. */
+static double distance_to_box(const Obstacle *o) {
+    Two place = two_at(&A.x), off = larger(larger(two_at(o->low) - place, place - two_at(o->high)), (Two){ 0.0, 0.0 });
+    return length_of(off[0], off[1]);
+}
+
+/* A length of path on which a particle cannot meet anything but the obstacle that it touches and leaves, come past its ends,
+   or leave the scene. */
+static double clearance(void) {
+    const double *box = A.given->exit_box, *up = A.given->up;
+    double least = INFINITY, radius = A.given->radius;
+    for (int n = 0; n < 2; n++) {
+        double place = (n ? -up[0] : up[1]) * A.x + up[n] * A.y;
+        least = MIN(least, MIN(place - box[n], box[2 + n] - place));
+    }
+    for (int n = 0; n < O.tip_count; n++)
+        least = MIN(least, length_of(A.x - O.tips[n].x, A.y - O.tips[n].y) - radius);
+    for (int k = 0; k < O.count && least > 0.0; k++) {
+        const Obstacle *o = O.all + k;
+        if (k == A.left || o->met == END || !(fabs(o->rho) >= 0.0 || o->met == FACE)) continue;
+        double x = A.x - o->x, y = A.y - o->y;
+        double off = o->met == FACE ? fabs(x * o->nx + y * o->ny) - radius : length_of(x, y) - fabs(o->rho);
+        least = MIN(least, MAX(fabs(off), distance_to_box(o)));
+    }
+    return least - O.touch;
+}
+
+/* When a particle that an obstacle has thrown off is back on it, if it cannot meet anything else before that, and the hop is
+   short; else infinite. The gap to a circle, over the time, is a straight line then, but for a small share. */
+double hop(const Motion *m, double until) {
+    if (A.left == NONE || A.order != 1 || A.point || O.change_count) return INFINITY;
+    const Obstacle *o = O.all + A.left;
+    double speed = speed_of(m), t = INFINITY;
+    if (o->met == FACE) {
+        double rate = A.left_side * (m->vx * o->nx + m->vy * o->ny), fall = A.left_side * (m->ax * o->nx + m->ay * o->ny);
+        if (rate > PARALLEL * speed && fall < -PARALLEL * length_of(m->ax, m->ay)) t = descent(0.0, rate, fall);
+    } else {
+        double dx = m->x - o->x, dy = m->y - o->y, sense = sign_of(o->rho);
+        double gap[] = { sense * 2.0 * (dx * m->vx + dy * m->vy),
+            sense * (m->vx * m->vx + m->vy * m->vy + (dx * m->ax + dy * m->ay)),
+            sense * (m->vx * m->ax + m->vy * m->ay), sense * 0.25 * (m->ax * m->ax + m->ay * m->ay) };
+        double line = -gap[0] / gap[1], most = 2.0 * line, step = INFINITY;
+        if (!(gap[0] > 0.0 && most > 0.0 && fabs(gap[2]) * most + fabs(gap[3]) * most * most < STRAIGHT * -gap[1]))
+            return INFINITY;
+        for (t = line; fabs(step) > SETTLED * t; t -= step)
+            step = polynomial(gap, 4, t) / (gap[1] + t * (2.0 * gap[2] + t * 3.0 * gap[3]));
+    }
+    double way = t * (speed + 0.5 * t * length_of(m->ax, m->ay));
+    if (!(t > 0.0 && t < until)) return INFINITY;
+    if (way > A.free) A.free = clearance();
+    if (way > A.free) return INFINITY;
+    A.free -= way;
+    return t;
 }
 
 /* Whether a point that rides round a circle cannot meet something at a place: see `is_barred`. */

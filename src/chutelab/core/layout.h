@@ -9,6 +9,7 @@
 #define LAYOUT_H
 
 #define MAX_HELD 4 /* surfaces that a disk can lie on at a time; contacts with more are resolved as impacts */
+#define MANY_TOUCHES 6 /* impacts in a row on one surface of which a family keeps no more */
 #define MOST_IDLE 400 /* consecutive rounds that take no time; with more a particle is stuck */
 #define MOST_CORNERS 32 /* of a particle */
 #define WAITS 20 /* greatest number of states of a track that wait until they become a knot or are left out */

@@ -24,6 +24,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chutelab import core
 from chutelab.engines.simulation import simulate
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.quantities import measured as read
@@ -72,7 +73,7 @@ def scipy(name: str) -> Any:
     return library(f"scipy.{name}", "SciPy is needed", "design")
 
 
-MANY_TOUCHES: Final = 6
+MANY_TOUCHES: Final = int(core.number("MANY_TOUCHES"))
 """Touches of one surface in a row beyond this number are ignored: a particle that bounces to rest
 has a thousand, and extra bounces do not change the sequence of contacts."""
 

@@ -272,7 +272,8 @@ def data(name: str, said: list[str]) -> list[str]:
 def words_under(name: str, package: str) -> list[str]:
     """Return what stands under a value, in the module of the package where it is given."""
     said: list[str] = []
-    for module in [one for one in sys.modules if one.startswith(package)]:
+    having = [one for one in sys.modules if one.startswith(package)]
+    for module in [one for one in having if name in vars(sys.modules[one])]:
         said = ModuleAnalyzer.for_module(module).find_attr_docs().get(("", name), said)
     return said
 

@@ -137,9 +137,10 @@ def agreement(
     if found[base].machine.releases.carried[0]:
         # None if it never leaves.
         track = track[track["t"] >= each(found[base], "separation.t")[0]]
-    time, velocity = np.diff(track["t"]), np.diff(track["velocity"], axis=0)
+    t, velocities = track["t"], track["velocity"]
+    time, velocity = np.diff(t), np.diff(velocities, axis=0)
     velocity += found[base].gravity * time[:, None] * found[base].machine.up
-    speed = float(np.hypot(*track["velocity"].T).max(initial=0.0))
+    speed = float(np.hypot(*velocities.T).max(initial=0.0))
     way = float(np.ptp(track["position"], axis=0).max(initial=0.0))
     lies = way <= LIES[0] * np.min(found[base].particle.radius)
     blows = not (np.abs(velocity[time > 0.0]) > 1e-9 * speed).any()

@@ -207,7 +207,8 @@ class Run:
                     self._torque = max(self._torque, mover.hinge.motor[1])
         elif last == "speed" and new.streams == old.streams and not carried:
             rows = module.array("surfaces", dtype("Surface"), module.world.surface_count)
-            rows["speed"] = pieces(build(new))["speed"][rows["material"]]
+            speeds, material = pieces(build(new))["speed"], rows["material"]
+            rows["speed"] = speeds[material]
             for particle in {*range(self._machine.count)} - self._pushed:
                 module.call("push_disk", particle, 0.0, 0.0)
         elif new != old:
@@ -231,6 +232,7 @@ class Run:
 
     def _moved(self) -> tuple[Floats, Floats, Floats, Floats]:
         disks, world = self._disks, self._module.world
+        owed = disks["owed"]
         h, on = world.t - disks["t"], self._under_way
         half = np.where((disks["supports"] > 0) & (disks["mode"] == _MODES["FREE"]), 0.5, 0.0)
         fell, light = h - half * world.length, np.where(half > 0.0, 0.0, disks["inv_mass"])
@@ -238,7 +240,7 @@ class Run:
         for n, name in enumerate("xy"):
             pull, v = (world.gx, world.gy)[n], disks[f"v{name}"]
             # A push still owes the second half of its impulse in the last step.
-            late = light * disks["owed"][:, n]
+            late = light * owed[:, n]
             found.append(np.where(on, disks[name] + (v + 0.5 * pull * h) * h, np.nan))
             found.append(np.where(on, v + pull * fell + late, np.nan))
         x, vx, y, vy = found

@@ -68,11 +68,12 @@ def fates(recording: Record, which: Bools | None = None) -> NDArray[Any]:
         return said
     last = recording.knots.take(recording.offsets[particles + 1] - 1)
     left, bottom, right, top = machine.releases.exit_box[particles].T
-    (x, y), out = last["position"].T, recording.ended_by("exit")[particles]
+    place, out = last["position"], recording.ended_by("exit")[particles]
+    x, y = place.T
     gone = out | (x < left) | (x > right) | (y < bottom) | (y > top)
     if gone.any():
-        said[particles[gone]] = _ways_out(recording, particles[gone], last["position"][gone])
-    stays, places, until = (every[~gone] for every in (particles, last["position"], last["t"]))
+        said[particles[gone]] = _ways_out(recording, particles[gone], place[gone])
+    stays, places, until = (every[~gone] for every in (particles, place, last["t"]))
     there, names, moves = Places(recording), machine.surfaces, moving(machine)
     home = np.full(len(stays), -1)
     if machine.landing >= 0:
@@ -135,7 +136,8 @@ def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
     touch = recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
     # Rows are in the order of time, so the last one of a particle remains.
     met, when = np.full(recording.count, -1), np.full(recording.count, -np.inf)
-    met[touch["particle"]], when[touch["particle"]] = touch["surface"], touch["t"]
+    whose = touch["particle"]
+    met[whose], when[whose] = touch["surface"], touch["t"]
     others = recording.surface_index(PARTICLES)
     since = np.full(len(gone), -np.inf)
     for name, moves in sorted(moving(machine).items()):

@@ -372,10 +372,10 @@ def _blows(recording: Record, begin: float, end: float) -> _Given:
     which are recorded with the lasting contacts.
     """
     some = recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
-    some = some[(some["t"] >= begin) & (some["t"] < end)]
-    change = recording.mass[some["particle"]][:, None] * (
-        some["velocity_after"] - some["velocity_before"]
-    )
+    t = some["t"]
+    some = some[(t >= begin) & (t < end)]
+    after, before, whose = some["velocity_after"], some["velocity_before"], some["particle"]
+    change = recording.mass[whose][:, None] * (after - before)
     # J = J_n n + J_t (n_y, -n_x): as complex numbers n (J_n - i J_t).
     push = some["normal_impulse"] - 1j * some["tangential_impulse"]
     alone = np.abs(np.hypot(*change.T) - np.abs(push)) <= SAME * np.abs(push)
@@ -397,14 +397,16 @@ def _kept(recording: Record, begin: float, end: float, samples: int) -> _Given:
     The impulse of a bin is spread evenly over it; bins longer than a sample count at several times.
     """
     rows = recording.lasting
-    rows = rows[(rows["to"] > begin) & (rows["from"] < end) & rows["impulse"].any(axis=-1)]
-    first, last = rows["from"].clip(begin), rows["to"].clip(max=end)
+    since, until = rows["from"], rows["to"]
+    within = (until > begin) & (since < end) & rows["impulse"].any(axis=-1)
+    rows, since, until = rows[within], since[within], until[within]
+    first, last = since.clip(begin), until.clip(max=end)
     parts = np.maximum(1, np.ceil((last - first) * samples / (end - begin))).astype(np.int64)
     of = np.repeat(np.arange(len(rows)), parts)
     nth = np.arange(len(of)) - np.repeat(parts.cumsum() - parts, parts)
     span = (last - first) / parts
     times = first[of] + (nth + 0.5) * span[of]
-    share = (span / (rows["to"] - rows["from"]))[of]
+    share = (span / (until - since))[of]
     rows = rows[of]
     impulse, stress = share[:, None] * rows["impulse"], share[:, None, None] * rows["stress"]
     own, other = rows["particle"], rows["other"]
@@ -420,14 +422,15 @@ def _kept(recording: Record, begin: float, end: float, samples: int) -> _Given:
 def _left_out(recording: Record, begin: float, end: float, blows: _Given) -> float:
     """Return the share of the impulses on particles that is due to lasting contacts, 0 to 1."""
     knots, owner = recording.knots, recording.owner
-    h = np.diff(knots["t"])
-    within = (np.minimum(knots["t"][1:], end) - np.maximum(knots["t"][:-1], begin)).clip(min=0.0)
+    t, velocity = knots["t"], knots["velocity"]
+    h = np.diff(t)
+    within = (np.minimum(t[1:], end) - np.maximum(t[:-1], begin)).clip(min=0.0)
     left = np.flatnonzero((owner[1:] == owner[:-1]) & (within > 0.0))
-    given = np.diff(knots["velocity"], axis=0)[left]
+    given = np.diff(velocity, axis=0)[left]
     given += recording.gravity * h[left, None] * recording.machine.up
     sizes = np.hypot(*given.T)
     # Flights change momentum only by gravity, to rounding.
-    fast = np.hypot(*knots["velocity"][left].T) + recording.gravity * h[left]
+    fast = np.hypot(*velocity[left].T) + recording.gravity * h[left]
     borne = recording.mass[owner[left]] * np.where(sizes > 1e-9 * fast, sizes, 0.0)
     lasting = float((borne * within[left] / h[left]).sum())
     return lasting / (lasting + blows.size) if lasting > 0.0 else 0.0

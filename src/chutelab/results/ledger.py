@@ -362,10 +362,10 @@ def _as_totals(recording: Record, times: Floats, found: Floats) -> Floats:
     before, after = (sums[:, np.searchsorted(begun, t, side=side)] for side in ("left", "right"))
     # After a step of no length, which has released particles, totals are noted again.
     before[:, 1:] = np.where(t[1:] > t[:-1], before[:, 1:], after[:, 1:])
-    told = np.stack(
-        [recording.totals["kinetic"], recording.totals["potential"], *recording.totals["entries"].T]
-    )
-    residual = told[:2].sum(axis=0) - before.sum(axis=0) - balance(recording.totals["entries"])
+    totals = recording.totals
+    kinetic, potential, entries = totals["kinetic"], totals["potential"], totals["entries"]
+    told = np.stack([kinetic, potential, *entries.T])
+    residual = told[:2].sum(axis=0) - before.sum(axis=0) - balance(entries)
     told = np.concatenate([told, residual[None]])
 
     late = np.searchsorted(t, times, side="right") - 1
@@ -394,7 +394,8 @@ def _under_way(
     """Return `energy_at` for each cell, (c,)."""
     a, b = recording.knots[left], recording.knots[left + 1]
     where, pace = hermite(recording.knots, left, share)
-    omega = a["omega"] + share * (b["omega"] - a["omega"])
+    omega, then = a["omega"], b["omega"]
+    omega = omega + share * (then - omega)
     body = recording.particle.of(particle)
     kinetic = body.kinetic(pace[:, 0], pace[:, 1], omega)
     potential = body.mass * recording.gravity * recording.machine.height(where)

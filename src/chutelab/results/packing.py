@@ -360,12 +360,15 @@ class Tracks:
         # knots.
         there, left = end > begin, np.clip(begin - 1, 0, len(knots) - 2)
         a, b = knots[np.where(there, begin, left)], knots[np.where(there, end - 1, left)]
-        t, h = knots["t"][left], knots["t"][left + 1] - knots["t"][left]
-        share = np.divide(events["t"] - t, h, out=np.ones(len(t)), where=h > 0.0).clip(0.0, 1.0)
-        before = np.stack([*a["position"].T, *a["velocity"].T, a["omega"]])
+        t, when = knots["t"], events["t"]
+        t, h = t[left], t[left + 1] - t[left]
+        share = np.divide(when - t, h, out=np.ones(len(t)), where=h > 0.0).clip(0.0, 1.0)
+        (x, y), (vx, vy), spin = a["position"].T, a["velocity"].T, a["omega"]
+        before = np.stack([x, y, vx, vy, spin])
         before[:4] = np.where(there, before[:4], np.hstack(hermite(knots, left, share)).T)
         last = np.append(np.diff(self.first), 1) > 0
-        after = np.stack([*b["velocity"].T, b["omega"]])
+        (vx, vy), spin = b["velocity"].T, b["omega"]
+        after = np.stack([vx, vy, spin])
         return np.concatenate([before, after]), there & ~self.still & last
 
     def states(self, told: Ints, particle: Particle) -> Floats:
@@ -411,7 +414,8 @@ def units_of(record: Record, tolerance: float) -> Floats:
     machine, dt = record.machine, float(record.machine.dt)
     radius, mass = float(record.radius.min()), float(record.mass.min())
     turned = ledger(record).turned_over
-    fastest = sqrt((record.knots["velocity"] ** 2).sum(axis=1).max())
+    velocity = record.knots["velocity"]
+    fastest = sqrt((velocity**2).sum(axis=1).max())
     speed = 2.5 * tolerance * radius / dt
     # Half a unit changes kinetic energies by at most the tolerance times the energy turned over.
     if turned * fastest > 0.0:
@@ -440,7 +444,8 @@ def pack(record: Record, tolerance: float) -> dict[str, NDArray[Any]]:
     told.append(tell_entries(knots["entries"].T, units[3]))
     exact = np.stack([events[name][part] for name, part in STATE])
     still = ~exact[8:].any(axis=0) & np.all(exact[2:5] == exact[5:8], axis=0)
-    times, index = np.unique(np.append(knots["t"], events["t"]), return_inverse=True)
+    of_knots, of_events = knots["t"], events["t"]
+    times, index = np.unique(np.append(of_knots, of_events), return_inverse=True)
     when = index[len(knots) :]
     packed = {
         "units": units,

@@ -142,8 +142,9 @@ def from_events(
     belt = nan if scene.outgoing is None else value(scene.outgoing, "speed")
     alpha = np.radians(nan if plate is None else value(plate, "angle_deg"))
     (x1, y1), (x2, y2), (x3, y3) = (event["position"].T for event in (left, hit, down))
+    t1, t2, t3 = (event["t"] for event in (left, hit, down))
     (ux, uy), (wx, wy) = hit["velocity_before"].T, hit["velocity_after"].T
-    vx, vy = down["velocity_before"].T
+    (sx, sy), (vx, vy) = left["velocity_after"].T, down["velocity_before"].T
     sine, cosine = np.sin(alpha), np.cos(alpha)
     away, along = -(wx * cosine + wy * sine), wx * sine - wy * cosine
     # Rounding must not choose between π and -π for a rebound up along the plate.
@@ -151,15 +152,15 @@ def from_events(
     energy = 0.5 * mass * (vx * vx + belt * belt)
     return {
         "phi1": np.arctan2(x1, y1),
-        "v1": np.hypot(*left["velocity_after"].T),
-        "t2": hit["t"] - left["t"],
+        "v1": np.hypot(sx, sy),
+        "t2": t2 - t1,
         "x2": x2 - x1,
         "y2": y1 - y2,
         "v2": np.hypot(ux, uy),
         "v2r": np.hypot(wx, wy),
         "phi2": np.arctan2(ux * cosine + uy * sine, ux * sine - uy * cosine),
         "phi2r": np.arctan2(away, along + 0.0),  # + 0.0: the angle of no rebound is 0, not -π
-        "t3": down["t"] - hit["t"],
+        "t3": t3 - t2,
         "x3": x2 - x3,
         "y3": y2 - y3,
         "v3x": -vx,
@@ -359,7 +360,8 @@ def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
         put(one, own["particle"][at], own.take(at.nonzero()[0]))
         found.append(one)
     # An impact that throws a carried particle off the belt is not the theory's separation.
-    holds = holds & ~(found[0]["t"] >= found[1]["t"])
+    t1, t2 = (one["t"] for one in found[:2])
+    holds = holds & ~(t1 >= t2)
     for one, (event, surface) in zip(found, NEEDED.items(), strict=True):
         holds = holds & (one["kind"] == Kind[event.upper()])
         holds &= one["surface"] == recording.surface_index(surface)

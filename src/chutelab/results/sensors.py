@@ -153,7 +153,8 @@ def reading(recording: Record, name: str) -> Reading:
     on = found[found["way"] > 0]
     mass, radius = recording.mass, recording.radius
     span = float(on["t"][-1] - on["t"][0]) if len(on) > 1 else 0.0
-    brought = mass[on["particle"]]
+    whose, along = on["particle"], on["along"]
+    brought = mass[whose]
     # The first passage opens the time span; the others pass within it.
     rate, flow = ((len(on) - 1) / span, float(brought[1:].sum()) / span) if span else (nan, nan)
     speeds = np.hypot(*on["velocity"].T)
@@ -162,13 +163,13 @@ def reading(recording: Record, name: str) -> Reading:
     if len(on):
         edges = np.quantile(speeds, QUANTILES).tolist()
         told = dict(zip(told, [float(speeds.mean()), *edges], strict=True))
-        low, _, high = np.quantile(on["along"], QUANTILES)
-        depth = float(high - low + 2.0 * np.median(radius[on["particle"]]))
-        sizes = radius[on["particle"]]
-        if np.ptp(sizes) > 0.0 and np.ptp(on["along"]) > 0.0:
-            alike = float(np.corrcoef(sizes, on["along"])[0, 1])
+        low, _, high = np.quantile(along, QUANTILES)
+        sizes = radius[whose]
+        depth = float(high - low + 2.0 * np.median(sizes))
+        if np.ptp(sizes) > 0.0 and np.ptp(along) > 0.0:
+            alike = float(np.corrcoef(sizes, along)[0, 1])
     scene = recording.scene
-    of = recording.machine.releases.kind[on["particle"]]
+    of = recording.machine.releases.kind[whose]
     names = [kind.name or f"particle[{n}]" for n, kind in enumerate(scene.particles)]
     return Reading(
         name=name,
@@ -214,9 +215,11 @@ def residence(recording: Record, begin: str, end: str) -> Floats:
     """
     found = np.full(recording.count, nan)
     later, enters = sensed(recording, end), first_passages(recording, begin)["t"]
+    whose, t = later["particle"], later["t"]
     for particle in np.flatnonzero(np.isfinite(enters)).tolist():
-        leaves = later["t"][(later["particle"] == particle) & (later["t"] >= enters[particle])]
-        found[particle] = leaves[0] - enters[particle] if len(leaves) else nan
+        entered = float(enters[particle])
+        leaves = t[(whose == particle) & (t >= entered)]
+        found[particle] = leaves[0] - entered if len(leaves) else nan
     return found
 
 

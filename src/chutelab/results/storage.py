@@ -309,6 +309,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     if not (knots.ndim == events.ndim == offsets.ndim == recording.totals.ndim == 1):
         raise _UnfitError("an array has another number of dimensions")
     sizes, surfaces = np.diff(offsets), len(recording.surfaces)
+    hung, swung = recording.swings["surface"], recording.swings["t"]
     sound = (
         len(offsets) > 0
         and offsets[0] == 0
@@ -337,9 +338,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         and all(
             mover.hinge is None or len(mover.hinge.states) for mover in recording.machine.movers
         )
-        and not np.any(
-            np.diff(recording.swings["t"])[np.diff(recording.swings["surface"]) == 0] < 0.0
-        )
+        and not np.any(np.diff(swung)[np.diff(hung) == 0] < 0.0)
         and not np.any((events["surface"] < -1) | (events["surface"] >= surfaces))
         and not np.any((events["particle"] < 0) | (events["particle"] >= len(sizes)))
         and not np.any((events["other"] < -1) | (events["other"] >= len(sizes)))
@@ -347,9 +346,10 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     )
     if not sound:
         raise _UnfitError("the arrays do not fit together")
-    backward = np.diff(knots["t"]) < 0.0
+    of_knots, of_events = knots["t"], events["t"]
+    backward = np.diff(of_knots) < 0.0
     backward[offsets[1:-1][(offsets[1:-1] > 0) & (offsets[1:-1] < len(knots))] - 1] = False
-    if np.any(backward) or np.any(np.diff(events["t"]) < 0.0):
+    if np.any(backward) or np.any(np.diff(of_events) < 0.0):
         raise _UnfitError("the times of a track, or of the events, go backward")
     return recording
 
@@ -426,8 +426,8 @@ def _table(
     if step is not None:
         if not 0.0 < step < inf:
             raise ValueError(f"step = {step!r}: a finite number above 0 s")
-        first, last = recording.ends()
-        spans = float((last["t"] - first["t"]).sum())
+        first, last = (ends["t"] for ends in recording.ends())
+        spans = float((last - first).sum())
         many = spans / step + len(first)
         if name == "trajectory" and many > MOST_ROWS:
             room = MOST_ROWS - len(first)
@@ -450,10 +450,10 @@ def instants(recording: Record) -> int:
     """
     if not len(recording.knots):
         return 0
-    first, last = recording.ends()
-    whole = float(last["t"].max() - first["t"].min())
+    first, last = (ends["t"] for ends in recording.ends())
+    whole = float(last.max() - first.min())
     # A particle has a row at each time within its track, and at most one more for its beginning.
-    share = float((last["t"] - first["t"]).sum()) / whole if whole > 0.0 else float(len(first))
+    share = float((last - first).sum()) / whole if whole > 0.0 else float(len(first))
     return max(2, min(SAMPLES, 1 + int((MOST_ROWS - len(first)) / share))) if share else SAMPLES
 
 

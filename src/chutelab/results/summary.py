@@ -183,8 +183,9 @@ def air_drag(recording: Record) -> Drag | None:
 def squeezed(recording: Record) -> Squeeze | None:
     """Return the riders that overlap by adhesion, see `machine.releases.squeeze`; or None."""
     released = recording.select(Kind.RELEASE)
-    released = released[recording.machine.releases.carried[released["particle"]]]
-    radius = recording.radius[released["particle"]]
+    whose = released["particle"]
+    carried = recording.machine.releases.carried[whose]
+    released, radius = released[carried], recording.radius[whose[carried]]
     return squeeze(recording.scene, released["t"], released["position"], radius)
 
 

@@ -301,10 +301,11 @@ class _Face:
     def _touching(self) -> _Touching:
         """Find the particles that touch the surface while they lose energy."""
         knots, owner = self.recording.knots, self.recording.owner
-        h = np.diff(knots["t"])
-        losses = np.diff(knots["entries"][:, 1:], axis=0).clip(min=0.0)
+        t, spot, spin, booked = (knots[name] for name in ("t", "position", "omega", "entries"))
+        h = np.diff(t)
+        losses = np.diff(booked[:, 1:], axis=0).clip(min=0.0)
         left = np.flatnonzero((owner[1:] == owner[:-1]) & (h > 0.0) & losses.any(axis=1))
-        way = np.hypot(*(knots["position"][left + 1] - knots["position"][left]).T)
+        way = np.hypot(*(spot[left + 1] - spot[left]).T)
         looks = np.ceil(way / self.edges[1]).clip(1, MOST_PIECES).astype(np.int64)
         left, looks = np.repeat(left, looks), np.repeat(looks, looks)
         nth = np.arange(len(left)) - np.searchsorted(left, left)
@@ -325,7 +326,7 @@ class _Face:
         if self.mover is not None:
             place, normal = self.mover.carried(foot, times), self._turned(normal, -times)
         moved = self.velocity(place, times, normal, which)
-        omega = knots["omega"][left] + share * (knots["omega"][left + 1] - knots["omega"][left])
+        omega = spin[left] + share * (spin[left + 1] - spin[left])
         along = np.stack([normal[:, 1], -normal[:, 0]], axis=-1)
         slip = np.abs(((velocity - moved) * along).sum(axis=-1) + radius * omega)
         # If it slips at one speed, or not at all, weight by time.
@@ -346,7 +347,8 @@ class _Face:
         """
         knots = self.recording.knots
         places, velocity = hermite(knots, left, share)
-        times = knots["t"][left] + share * (knots["t"][left + 1] - knots["t"][left])
+        t = knots["t"]
+        times = t[left] + share * (t[left + 1] - t[left])
         return velocity, times, self.at_rest(places, times)
 
 

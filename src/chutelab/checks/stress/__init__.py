@@ -187,9 +187,10 @@ def momentum(e: Evidence) -> Verdict | None:
         along = tangent[None]
     first, last = e.recording.ends()
     mass = e.masses[e.recording.released, None]
-    fall = -m.gravity * (last["t"] - first["t"])[:, None] * m.up
-    change = (mass * (last["velocity"] - first["velocity"] - fall) @ along.T).sum(axis=0)
-    size = (mass[:, 0] * (np.hypot(*first["velocity"].T) + np.hypot(*fall.T))).sum()
+    begin, end, before, after = first["t"], last["t"], first["velocity"], last["velocity"]
+    fall = -m.gravity * (end - begin)[:, None] * m.up
+    change = (mass * (after - before - fall) @ along.T).sum(axis=0)
+    size = (mass[:, 0] * (np.hypot(*before.T) + np.hypot(*fall.T))).sum()
     figure = float(np.abs(change).max() / size)
     rounding = EPS * (ROUNDINGS + A_CONTACT * max(e.recording.contacts, e.recording.steps))
     return Verdict(figure, rounding, "of the sum of m |v|")
@@ -214,9 +215,10 @@ def loads(e: Evidence) -> Verdict | None:
     borne = e.recording.impulses["force"]
     first, last = e.recording.ends()
     mass = e.masses[e.recording.released, None]
-    given = mass * (last["velocity"] - first["velocity"])
-    given += mass * e.machine.gravity * (last["t"] - first["t"])[:, None] * e.machine.up
-    size = float(np.abs(borne).sum() + (mass * np.abs(first["velocity"])).sum())
+    begin, end, before, after = first["t"], last["t"], first["velocity"], last["velocity"]
+    given = mass * (after - before)
+    given += mass * e.machine.gravity * (end - begin)[:, None] * e.machine.up
+    size = float(np.abs(borne).sum() + (mass * np.abs(before)).sum())
     off = float(np.abs(given.sum(axis=0) + borne.sum(axis=(0, 1))).max())
     return Verdict(off / size if size else off, BORNE, "of all impulses")
 

@@ -167,7 +167,8 @@ def nothing_through(e: Evidence) -> Verdict | None:
     """No centre passes a surface between its ends; the figure counts the passages."""
     if not e.machine.pieces or not len(e.recording.knots):
         return None
-    found = e.found.hits[e.found.hits["passes"] == 1]
+    once = e.found.hits["passes"] == 1
+    found = e.found.hits[once]
     return Verdict(len(found), 0.0, _first(e, "particle {} through {} at t = {:.6g} s", found))
 
 
@@ -302,27 +303,28 @@ def on_something(e: Evidence) -> Verdict | None:
     """
     surfaces, found, late = e.machine.surfaces, [], e.dt or 0.0
     events = e.recording.select(*AT_SURFACES)
-    events = events[(events["surface"] >= 0) & (events["surface"] < len(surfaces))]
+    surface = events["surface"]
+    events = events[(surface >= 0) & (surface < len(surfaces))]
     angular = e.cornered[events["particle"]]
     events = np.concatenate([events[~angular], _few(events[angular])])
     if len(events):
         off = np.full((len(surfaces), len(events)), inf)
+        whose, when, where = events["particle"], events["t"], events["position"]
         outlines = {
-            n: e.outline(events[n]["particle"], events[n]["t"], events[n]["position"])[0]
-            for n in np.flatnonzero(e.cornered[events["particle"]])
+            n: e.outline(whose[n], when[n], where[n])[0] for n in np.flatnonzero(e.cornered[whose])
         }
         for piece in e.machine.pieces:
-            seen = e.seen_from(piece, events["t"], events["position"])
-            gap = np.abs(piece.gap(seen, e.radii[events["particle"]]))
+            gap = np.abs(piece.gap(e.seen_from(piece, when, where), e.radii[whose]))
             for n, outline in outlines.items():
-                gap[n] = piece.apart(e.seen_from(piece, events[n]["t"], outline))
-            there = piece.there(events["t"], late)
+                gap[n] = piece.apart(e.seen_from(piece, when[n], outline))
+            there = piece.there(when, late)
             row = off[piece.surface]
             row[there] = np.minimum(row, gap)[there]
-        far = off[events["surface"], np.arange(len(events))]
+        surface = events["surface"]
+        far = off[surface, np.arange(len(events))]
         hit = events[np.argmax(far)]
-        place = f"particle {hit['particle']} off {surfaces[hit['surface']]}"
-        found.append((far.max(), f"{place} at t = {hit['t']:.6g} s"))
+        said = f"particle {hit['particle']} off {surfaces[hit['surface']]}"
+        found.append((far.max(), f"{said} at t = {hit['t']:.6g} s"))
     for hit in _few(e.recording.select(Kind.COLLISION)):
         i, j, t = int(hit["particle"]), int(hit["other"]), float(hit["t"])
         (place,), _ = e.recording.at([t])
@@ -397,19 +399,17 @@ def cone(e: Evidence) -> Verdict | None:
     events = e.recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
     if not len(events):
         return None
-    kinds = e.machine.releases.kind
-    friction = e.machine.pair_friction[kinds[events["particle"]], kinds[events["other"]]]
+    kinds, own, other = e.machine.releases.kind, events["particle"], events["other"]
+    friction = e.machine.pair_friction[kinds[own], kinds[other]]
     if e.recording.engine == "pymunk":
         friction = np.maximum(friction, LEAST)
-    alone = np.flatnonzero(events["other"] < 0)
+    alone = np.flatnonzero(other < 0)
     struck, _, _ = _struck(e, events[alone])
     friction[alone] = _of_pieces(e, events[alone], struck, "friction")
     rough = np.isinf(friction)
-    angular = e.cornered[events["particle"]] | (
-        e.cornered[events["other"]] & (events["other"] >= 0)
-    )
-    rough |= angular
-    normal, along = events["normal_impulse"], np.abs(events["tangential_impulse"])
+    rough |= e.cornered[own] | (e.cornered[other] & (other >= 0))
+    normal, along = events["normal_impulse"], events["tangential_impulse"]
+    along = np.abs(along)
     excess = np.where(rough, 0.0, along - np.where(rough, 0.0, friction) * normal)
     momentum = e.masses.max() * e.bounds.speed
     return _verdict(events, np.maximum(excess, -normal) / momentum, "of m v")
@@ -458,17 +458,19 @@ def _struck(e: Evidence, events: NDArray[Any]) -> tuple[Ints, Floats, Ints]:
     best, touched = np.full(len(events), inf), np.zeros(len(events), dtype=int)
     struck, away = np.zeros(len(events), dtype=int), np.zeros((len(events), 2))
     near = e.bounds.rounding + e.bounds.arcs + e.bounds.late
+    t, where, surface = events["t"], events["position"], events["surface"]
+    radius = e.radii[events["particle"]]
     for n, piece in enumerate(e.machine.pieces):
-        place = e.seen_from(piece, events["t"], events["position"])
+        place = e.seen_from(piece, t, where)
         out, face = piece.away(place), piece.normal(place)
         # Beside a face the vector is along its normal; for small disks positions give it only
         # roughly.
         high = (out * face).sum(axis=1)[:, None] * face
         out = np.where((np.hypot(*(out - high).T) <= e.bounds.rounding)[:, None], high, out)
-        off = np.abs(np.hypot(*out.T) - e.radii[events["particle"]])
-        off[~piece.there(events["t"], e.dt or 0.0)] = inf
+        off = np.abs(np.hypot(*out.T) - radius)
+        off[~piece.there(t, e.dt or 0.0)] = inf
         touched += off <= near
-        nearer = (events["surface"] == piece.surface) & (off < best)
+        nearer = (surface == piece.surface) & (off < best)
         best[nearer], struck[nearer], away[nearer] = off[nearer], n, out[nearer]
     return struck, away, touched
 

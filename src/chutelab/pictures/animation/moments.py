@@ -335,9 +335,9 @@ def _words(
     near = 0.25 * float(np.diff(times).min(initial=np.inf))
     flying = in_flight(recording, times, near)
     still = ~np.any(nominal(recording, times)[1], axis=1)
-    captions = []
+    captions, told_at = [], own["t"][stories]
     for t, flies, lies in zip(times, flying.tolist(), still.tolist(), strict=True):
-        story = int(np.searchsorted(own["t"][stories], t, side="right")) - 1
+        story = int(np.searchsorted(told_at, t, side="right")) - 1
         if story >= 0:
             last = own[stories[story]]
             # An impact is no longer mentioned once the particle slides.

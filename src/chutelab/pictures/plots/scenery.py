@@ -89,7 +89,8 @@ def action(recording: Recording) -> tuple[float, float]:
 def struck_by_nominal(recording: Recording) -> NDArray[Any]:
     """Return the events in which particle 0 hits something or is hit."""
     struck = recording.select(*STRUCK)
-    return np.asarray(struck[(struck["particle"] == 0) | (struck["other"] == 0)])
+    one, other = struck["particle"], struck["other"]
+    return np.asarray(struck[(one == 0) | (other == 0)])
 
 
 def strobe_step(recording: Recording) -> float:

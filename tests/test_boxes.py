@@ -663,6 +663,24 @@ def test_poured_boxes_get_into_each_other_and_into_walls_as_little_as_disks_do(c
     assert not now.velocity[-1].any()
 
 
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+@pytest.mark.parametrize("mu", [0.5, 0.05], ids=["sticks", "slips"])
+def test_a_flat_blow_loses_in_the_bounce_and_to_friction_what_newton_and_coulomb_say(engine, mu):
+    """It does not turn, so both corners have the velocity of the centre before and after.
+
+    J_n = m (1 + e) v_n loses m (1 - e^2) v_n^2 / 2, and J_t = min(m v_t, mu J_n), which makes w_t
+    of v_t, loses J_t (v_t + w_t) / 2 to friction, however the corners share it.
+    """
+    e, along, fall = 0.5, 0.3, 0.13
+    more = {"stream": {"interact": True}, "run": {"until": 0.18, "dt": 2e-6}}
+    tables = scene([0.0, W / 2.0 + fall], [along, 0.0], size=(W, W), e=e, mu=mu, **more)
+    books = run(tables, engine).ledger.by_surface["floor"]
+    pull = min(M * along, mu * M * (1.0 + e) * sqrt(2.0 * G * fall))
+    off = {"rel": 1e-4 if engine == "pymunk" else 1e-12}
+    assert books["restitution_loss"] == pytest.approx(M * G * fall * (1.0 - e * e), **off)
+    assert books["friction_loss"] == pytest.approx(pull * (along - 0.5 * pull / M), **off)
+
+
 def test_a_box_falls_flat_on_its_like_in_line_with_it():
     """Their sides are in one line, so that no corner is ever inside by more than rounding."""
     wide, high, speed = 0.106, 0.021, 4.9

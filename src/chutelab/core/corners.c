@@ -477,22 +477,26 @@ RARELY void strike_corners(int i, int j, double t) {
     was_moved(i);
     if (!(fastest > ROUNDS * (fabs(a->vx) + fabs(a->vy)))) return;
     if (two) was_moved(j);
-    double before[3] = {a->vx, a->vy, a->spin}, lost, normal = 0, slip = 0;
+    double before[3] = {a->vx, a->vy, a->spin}, lost, sums[3] = {0}, losses[3] = {0};
     lost = find_blow(list, count, fastest, answers, u, back);
     for (int n = 0; n < count; n++) {
         Contact *c = list + n;
         double v[3], given[3];
         relative(c, 0, v);
         share_out(c, u[n], v, 0, c->entries, given);
-        normal += MAX(c->entries[1], 0);
-        slip += MAX(c->entries[2], 0);
+        for (int k = 1; k < 3; k++) {
+            sums[k] += c->entries[k];
+            losses[k] += MAX(c->entries[k], 0);
+        }
         if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
     }
-    /* Only the sum has a meaning where one impulse changes the velocity at another place. */
-    double by = normal + slip > 0 ? MAX(lost, 0) / (normal + slip) : 0;
+    /* Only the sums have a meaning where one impulse changes the velocity at another place: corners that stick share
+       friction in any way, also with opposite signs. If bounce or friction seems to gain, the other loses it all. */
+    double all = MAX(sums[1], 0) + MAX(sums[2], 0), by = all > 0 ? MAX(lost, 0) / all : 0;
     for (int n = 0; n < count; n++) {
         Contact *c = list + n;
-        for (int k = 1; k < 3; k++) c->entries[k] = by * MAX(c->entries[k], 0);
+        for (int k = 1; k < 3; k++)
+            c->entries[k] = losses[k] > 0 ? by * MAX(sums[k], 0) / losses[k] * MAX(c->entries[k], 0) : 0;
         book(a->entries, two ? b->entries : 0, c->owner, c->entries);
         if (j < 0) W.drives[c->owner] += driven(c, 0);
         if (j < 0 && c->impulse[0] > 0) hold(a, -1 - c->j);

@@ -419,6 +419,24 @@ def test_a_blow_on_another_lever_lifts_none_off_its_stop(before):
     assert after == pytest.approx(e * speed, rel=1e-9)
 
 
+@pytest.mark.parametrize("higher", [4e-4, 7e-4, 1e-3])
+def test_a_blow_on_a_lever_strikes_nothing_that_slides_in_an_arc(higher):
+    """On its way up in a hop, as fast as v^2 / (R - r) = 10 g makes it, a disk stays in contact."""
+    radius, speed = 0.1, 3.0
+    bowl = {"name": "bowl", "center": [-4.0, 0.0], "radius": radius, "from_deg": 180.0,
+            "to_deg": 360.0, "restitution": 0.5, "friction": 0.0}  # fmt: skip
+    stream = [
+        {"at": [-4.0 - radius + R, 0.0], "velocity": [0.0, -speed], "interact": True},
+        {"at": [0.3, R + 0.01 + higher], "velocity": [0.0, -speed]},
+    ]
+    scene = machine(stream, run={"until": 0.05}, more=[bowl], inertia=1e-2)
+    recording = chutelab.simulate(scene, engine="contact")
+    assert {*recording.select("impact")["particle"].tolist()} == {1}
+    track = recording.track(0)
+    energy = 0.5 * (track["velocity"] ** 2).sum(axis=1) + G * track["position"][:, 1]
+    assert energy == pytest.approx(0.5 * speed**2, rel=2e-3)
+
+
 def test_a_lever_that_a_blow_left_on_its_stop_stands_under_the_next_one():
     """It is at rest up to rounding, which may turn it off the stop by 1e-14 rad/s: v' = -e v.
 

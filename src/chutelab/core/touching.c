@@ -119,7 +119,8 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     const Disk *d = W.disks + i;
     double u[3], later, haste = 0;
     if (j < 0 && !place && !still && face_at(surface_at(-1 - j, d->t), d->x, d->y) != W.surfaces + (-1 - j)) return 1;
-    if (j < 0) haste = 2 * h * hastes(W.surfaces + (-1 - j), d);
+    /* If the step before was cut short, a disk inside an arc is still on the way up in its hop. */
+    if (j < 0) haste = 2 * h * hastes(W.surfaces + (-1 - j), d) + 2 * W.step * pressed_inside(d, -1 - j);
     if (still) go_on_with(c, still, change, h);
     else if (place) describe_touch(c, i, j, place);
     else describe(c, i, j);

@@ -16,6 +16,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,12 @@ FLAGS = (
 )  # fmt: skip
 """No fused multiply-add: every engine that runs the file has to round alike. Vectors of two doubles
 round as doubles do."""
+
+MUSL = (
+    "__math_divzero", "__math_invalid", "__math_oflow", "__math_uflow", "__math_xflow", "atan2",
+    "exp_data", "pow", "pow_data",
+)  # fmt: skip
+"""Files of the C library in C with what the core calls; the linker tells if one is missing."""
 
 ONCE = (
     "exact_cuts", "exact_joints", "exact_pieces", "hand", "loads", "nominal", "plan", "prepare",
@@ -106,32 +113,65 @@ def checks(described: Any) -> str:
     return "\n".join(lines) + "\n"
 
 
+def compiled(*commands: list[str | Path]) -> None:
+    """Run commands of the compiler beside each other."""
+    compilers = [
+        subprocess.Popen([sys.executable, "-m", "ziglang", *command], cwd=CORE)
+        for command in commands
+    ]
+    codes = [compiler.wait() for compiler in compilers]
+    if any(codes):
+        raise SystemExit(1)
+
+
+def library(place: Path) -> list[str | Path]:
+    """Compile what the core needs of the C library; return it and the flags to use it with.
+
+    The compiler itself would build all of it, which takes longer than the core.
+    """
+    spec = find_spec("ziglang")
+    if spec is None or spec.origin is None:
+        raise SystemExit("needs the compiler: pip install ziglang, as pyproject.toml pins it")
+    lib = Path(spec.origin).parent / "lib"
+    target = ("-target", "wasm32-wasi")
+    musl = lib / "libc" / "musl"
+    math = [musl / "src" / "math" / f"{name}.c" for name in MUSL]
+    sources = [*math, lib / "libc" / "wasi" / "libc-bottom-half" / "crt" / "crt1-reactor.c"]
+    inside = ("-I", musl / "src" / "internal", "-I", musl / "arch" / "generic")
+    c = ("cc", *target, "-c", "-O3", "-ffp-contract=off", "-Dhidden=", *inside)
+    zig = ("build-obj", *target, "-O", "ReleaseFast", "-fstrip", "-lc")
+    roots = [lib / "c.zig", lib / "compiler_rt.zig"]
+    made = {source: place / f"{source.stem}.o" for source in (*roots, *sources)}
+    compiled(
+        *([*zig, source, f"-femit-bin={made[source]}"] for source in roots),
+        *([*c, source, "-o", made[source]] for source in sources),
+    )
+    headers = [lib / "libc" / "include" / name for name in ("wasm-wasi-musl", "generic-musl")]
+    return ["-nostdlib", *(part for one in headers for part in ("-isystem", one)), *made.values()]
+
+
 def build(folder: Path) -> None:
     """Write both cores and layout.json into a folder."""
     described = layout((CORE / "layout.h").read_text(encoding="utf-8"))
     with tempfile.TemporaryDirectory() as place:
-        sources = []
+        sources: list[str | Path] = []
         for source in sorted(CORE.glob("*.c")):
             small = Path(place) / source.name
             text = source.read_text(encoding="utf-8")
             small.write_text(SMALL.replace("{}", text), encoding="utf-8")
-            sources.append(str(small if source.stem in ONCE else source))
+            sources.append(small if source.stem in ONCE else source)
         check = Path(place) / "layout.c"
         check.write_text(checks(described), encoding="utf-8")
-        compilers = [
-            subprocess.Popen(
+        linked = library(Path(place))
+        compiled(
+            *(
                 [
-                    sys.executable, "-m", "ziglang", "cc", *FLAGS, "-I", str(CORE),
-                    *(f"-Wl,--export={one}" for one in exports), "-o", str(folder / name),
-                    *sources, str(check), "-lm",
-                ],
-                cwd=CORE,
+                    "cc", *FLAGS, "-I", CORE, *(f"-Wl,--export={one}" for one in exports),
+                    "-o", folder / name, *sources, check, *linked,
+                ]
+                for name, exports in BUILT.items()
             )
-            for name, exports in BUILT.items()
-        ]  # fmt: skip
-        codes = [compiler.wait() for compiler in compilers]
-        if any(codes):
-            raise SystemExit(1)
+        )  # fmt: skip
     text = json.dumps(described) + "\n"
     (folder / "layout.json").write_text(text, encoding="utf-8")
 

@@ -400,6 +400,41 @@ def test_what_a_step_of_no_length_releases_leaves_nothing_over_then(name):
     assert abs(now["residual"][0]) <= 1e-12 * (1e-3 + abs(now["potential"][0]))
 
 
+TWO = [{"at": [0.0, 0.5], "start": 0.1}, {"at": [0.2, 0.6], "start": 0.05}]
+BOX = {"shape": "box", "size": [0.03, 0.03]}
+LATE = {
+    "boxes": (BOX, {"at": [0.0, 0.5], "count": 3, "rate": 20}, {}),
+    "off the steps": (BOX, [{"at": [0.0, 0.5], "start": t} for t in (0.0, 0.0503)], {}),
+    "a disk and a box": (
+        [{"name": "disk", "radius": 0.02}, {"name": "box", **BOX}],
+        [{"at": [0.0, 0.5], "start": t, "particle": one}
+         for t, one in ((0.0, "disk"), (0.1, "disk"), (0.1, "box"), (0.1, "disk"))], {},
+    ),
+    "tied": ({"radius": 0.02}, TWO, {"rod": [{"from": [0.3, 0.5], "particle": 0}]}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LATE)
+def test_what_is_released_during_a_run_counts_once_from_its_release_on(name):
+    """Nothing is struck: K + U of all is that at their releases, at each step and between them."""
+    kinds, streams, more = LATE[name]
+    alike = {"velocity": [0.0, -1.0], "interact": True}
+    kinds = [one | {"mass": 0.05} for one in np.ravel(kinds)]
+    streams = [one | alike for one in np.ravel(streams)]
+    for n, one in enumerate(streams):
+        one["at"] = [one["at"][0] + 0.1 * n, one["at"][1]]
+    tables = {"particle": kinds, "stream": streams, "run": {"until": 0.2}, **more}
+    run = simulate(scene.from_dict(tables), engine="contact")
+    first = run.ends()[0]
+    brought = 0.05 * (0.5 + 9.81 * first["position"][:, 1])
+    spots = np.unique(np.concatenate([run.totals["t"], first["t"]]))
+    times = np.concatenate([spots, spots[:-1] + 0.4 * np.diff(spots)])
+    times = times[(times >= first["t"].min()) & (times < 0.2)]
+    now = energy_at(run, times)
+    there = (brought * (first["t"] <= times[:, None])).sum(axis=1)
+    assert now["kinetic"] + now["potential"] == pytest.approx(there, abs=1e-6)
+
+
 @pytest.mark.parametrize("name", FEW_CROWDS)
 def test_the_energy_of_a_crowd_is_that_of_its_steps_and_closes_at_any_time(name):
     """K + U of all, less that at their releases, less what they got, is 0 at each step."""

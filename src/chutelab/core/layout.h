@@ -494,6 +494,7 @@ typedef struct {
     int stalled;         /* the disk that stalled */
     double air_loss;     /* J; loss by drag */
     double released;     /* J; energy of disks at their releases */
+    double latest[3];    /* s, J; time of the latest release, kinetic and potential energy of all disks released then */
     double ended[5];     /* J; of disks of a crowd at their ends: kinetic, potential, entries */
     double push_work;    /* J; work of pushes by hand */
     double hastened;     /* m/s2; greatest acceleration of a disk by such a push */

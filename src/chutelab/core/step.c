@@ -97,6 +97,12 @@ void note_totals(void) {
         all.potential += lifted(d, place);
         for (int n = 0; n < 3; n++) all.entries[n] += d->entries[n] - ahead[n];
     }
+    /* What is released at this instant does not count yet, unless its totals were noted before. */
+    if (W.latest[0] == W.t && !(W.total_count && W.totals[W.total_count - 1].t == W.t)) {
+        all.kinetic -= W.latest[1];
+        all.potential -= W.latest[2];
+        all.released -= W.latest[1] + W.latest[2];
+    }
     add_springs(all.springs);
     double owed = 0;
     for (int n = 0; n < 2; n++) {

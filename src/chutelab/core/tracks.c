@@ -39,7 +39,10 @@ int release(int i, double t) {
     if (d->ride_rho > 0) plan_ride(d, t);
     event_here(RELEASE, i, -1);
     knot_now(i);
-    W.released += kinetic_of(d, &d->vx, d->spin) + lifted(d, &d->x);
+    double own[2] = {kinetic_of(d, &d->vx, d->spin), lifted(d, &d->x)};
+    W.released += own[0] + own[1];
+    for (int n = 0; n < 2; n++) W.latest[1 + n] = own[n] + (t == W.latest[0] ? W.latest[1 + n] : 0);
+    W.latest[0] = t;
     if (d->ride_rho > 0) ride_on(d, t, MAX(W.step_end, t));
     else {
         take_off(i);

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -72,20 +73,15 @@ class Block:
     values: Floats  # (n, K); the values of each variant
     engine: str | None = None  # overrides ``run.engine``
     repeat: int = 1  # seeds that each variant is run with
+    judge: Judge | None = None  # of this scene and these paths; blocks in this process share it
+
+    def __getstate__(self) -> dict[str, object]:
+        """Another process finds its own judge."""
+        return {**vars(self), "judge": None}
 
     def settings(self, row: int) -> dict[str, float]:
         """Return the values of one variant by path."""
         return dict(zip(self.paths, self.values[row].tolist(), strict=True))
-
-
-_judges: list[Judge] = []
-"""The latest one: all blocks of a plan have the same scene."""
-
-
-def _judge_of(block: Block) -> Judge:
-    if not (_judges and _judges[0].scene is block.scene and _judges[0].paths == block.paths):
-        _judges[:] = [Judge(block.scene, block.paths)]
-    return _judges[0]
 
 
 def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
@@ -99,7 +95,7 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
     values = block.values
     good = np.stack([accepted(*column) for column in zip(block.paths, values.T, strict=True)]).T
     sound = np.asarray(good.all(axis=1))
-    judge = _judge_of(block)
+    judge = block.judge or Judge(block.scene, block.paths)
     asked = np.array([judge.reads(path) or not sound.any() for path in block.paths])
     while True:
         telling = np.where(good & ~asked, 0.0, values)
@@ -222,7 +218,7 @@ def row_of(scene: Scene) -> Columns:
 def seeds_of(block: Block) -> Iterator[Block]:
     """Yield the block with each of its seeds, the same for all variants."""
     for number in range(block.repeat):
-        yield replace(block, scene=reseeded(block.scene, number), repeat=1)
+        yield replace(block, scene=reseeded(block.scene, number), repeat=1, judge=None)
 
 
 def swept(block: Block, *, apart: bool = False) -> Columns:
@@ -297,9 +293,13 @@ class Plan:
             axes = [np.array(vary.values) for vary in self.varies]
             places = np.unravel_index(np.arange(first, last), tuple(map(len, axes)))
             values = np.stack([axis[at] for axis, at in zip(axes, places, strict=True)], axis=1)
-        paths = tuple(quantity.path for quantity in self.quantities)
         # + 0.0: there is one zero.
-        return Block(self.scene, paths, values + 0.0, self.engine, self.repeat)
+        judge = self._judge
+        return Block(self.scene, judge.paths, values + 0.0, self.engine, self.repeat, judge)
+
+    @cached_property
+    def _judge(self) -> Judge:
+        return Judge(self.scene, tuple(quantity.path for quantity in self.quantities))
 
 
 def planned(

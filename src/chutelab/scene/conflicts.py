@@ -131,7 +131,8 @@ def checks(look: Look) -> Iterator[Check]:
     yield partial(_references, look)
     for kind in kinds:
         yield partial(_mass, look, kind)
-    yield partial(_engine, look, kinds, streams)
+    yield partial(_sizes, look, kinds, streams)
+    yield partial(_engine, look, streams)
     for stream in streams:
         yield partial(_width, stream, kinds)
     for table in RULES:
@@ -272,11 +273,10 @@ def _mass(look: Look, kind: Row) -> Iterator[Fault]:
         yield kind.fault(key, f"{text}, not {mass:.3g} kg")
 
 
-def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterator[Fault]:
-    run = look.row("run")
-    joined = [table for table in JOINTS if look.rows(table)]
-    engine, count = run["engine"], sum(stream["count"] for stream in streams)
-    sizes, meet = [kind["radius"] for kind in kinds], [s for s in streams if s["interact"] is True]
+def _sizes(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterator[Fault]:
+    """Report shapes, and points, that an engine does not have."""
+    run, sizes = look.row("run"), [kind["radius"] for kind in kinds]
+    engine = run["engine"]
     for kind, size in zip(kinds, sizes, strict=True):
         shape, path = kind["shape"], kind.path("radius")
         if shape in ("box", "polygon"):
@@ -289,8 +289,16 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
                 yield kind.fault("radius", text)
             if engine in ("contact", "pymunk"):
                 yield run.fault("engine", f"{path} is 0, and {engine} needs disks (> 0)")
-            for stream in meet:
-                yield stream.fault("interact", f"{path} is 0, and mass points never meet")
+            for stream in streams:
+                if stream["interact"] is True:
+                    yield stream.fault("interact", f"{path} is 0, and mass points never meet")
+
+
+def _engine(look: Look, streams: Sequence[Row]) -> Iterator[Fault]:
+    run = look.row("run")
+    joined = [table for table in JOINTS if look.rows(table)]
+    engine, count = run["engine"], sum(stream["count"] for stream in streams)
+    meet = [stream for stream in streams if stream["interact"] is True]
     for stream in meet if engine == "exact" and count > 1 else ():
         many = f"{stream.path('count')} = {stream['count']}"
         text = f"{stream.path('interact')} with {many} needs contact or pymunk"

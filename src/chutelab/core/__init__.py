@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from chutelab.util.files import version_of, whole
 
-LARGE = 128 * 2**20
+LARGE = 96 * 2**20
 """A used memory larger than this, in bytes, is freed instead of kept for the next run."""
 
 SUBJECTS = ("Room", "World", "Plan", "Drawing", "Laws", "Exact", "Loads")

@@ -359,7 +359,7 @@ EXPORT int lay_out_exact(void) {
     RESERVE(E.books, 3.0 * E.surface_count * (E.apart ? E.lone_count : 1));
     E.room_size = 100 * (E.segment_count + E.arc_count) + 200;
     E.knot_room = E.brief ? BRIEFLY : (int)many + 500;
-    E.event_room = E.brief ? 10 * E.lone_count + ROUND_EVENTS : (int)many + 100;
+    E.event_room = E.brief ? 15 * E.lone_count + ROUND_EVENTS : (int)many + 100;
     RESERVE(E.room, E.room_size);
     lay_out_shared();
     E.knots = set_apart(E.knot_room, sizeof *E.knots);

@@ -146,7 +146,7 @@ static int make_room(char **rows, int *room, int count, int more, int size) {
 }
 
 static int begin_briefly(const Exact *e) {
-    int knots = 4 * e->lone_count, labels = 10 * e->lone_count;
+    int knots = 4 * e->lone_count, labels = 15 * e->lone_count;
     Kept.knot_count = Kept.label_count = 0, Kept.knot_room = knots, Kept.label_room = labels;
     Kept.knots = set_apart(knots, KNOT_SIZE), Kept.labels = set_apart(labels, LABEL_SIZE);
     return take_machine(e) && RESERVE(L.offsets, L.particle_count + 1) && has_room();

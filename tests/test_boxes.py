@@ -248,6 +248,26 @@ def test_a_box_waits_until_the_one_in_its_place_has_fallen_out_of_it(engine):
     assert released.tolist() == pytest.approx([0.0, np.sqrt(2.0 * H / G)], abs=2e-3)
 
 
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+@pytest.mark.parametrize("taken", ["by a disk", "by a surface"])
+def test_a_box_waits_until_what_is_round_or_a_surface_has_left_its_place(engine, taken):
+    """A disk falls by g t² / 2 = r + h / 2, a travel (d in 1 s) begins with 2 d t² = h / 2."""
+    r, d, at = 0.015, 0.4, {"at": [0.3, 0.5], "velocity": [0.0, 0.0], "interact": True}
+    floor = {"name": "floor", "from": [-1.0, -2.0], "to": [1.0, -2.0]}
+    arm = {"name": "arm", "from": [0.2, 0.5], "to": [0.4, 0.5],
+           "travel": {"to": [0.2, 0.5 - d], "at": 0.0, "in": 1.0}}  # fmt: skip
+    box = {"name": "box", "shape": "box", "size": [W, H], "mass": M}
+    disk = {"particle": "disk", **at, "at": [0.3, 0.5 + (taken == "by a surface")]}
+    tables = {
+        "particle": [box, {"name": "disk", "radius": r, "mass": M}],
+        "stream": [disk, {"particle": "box", "start": 0.02, **at}],
+        "surface": [floor, arm][: 1 + (taken == "by a surface")], "run": {"until": 0.3},
+    }  # fmt: skip
+    released = chutelab.simulate(tables, engine=engine).select("release")
+    goes = sqrt(2.0 * (r + 0.5 * H) / G) if taken == "by a disk" else sqrt(H / (4.0 * d))
+    assert released["t"][released["particle"] == 1] == pytest.approx(goes, abs=2e-3)
+
+
 def drawn(seed):
     """A box or polygon that turns and strikes a surface or a disk, rough and elastic as drawn."""
     random = np.random.default_rng(seed)

@@ -369,7 +369,9 @@ class Shapes:
         body.position = place
         touch = SLOP * self.smallest + 2.0 * self.world.hair
         return any(
-            point.distance < -touch
+            # Of what overlaps; the sign is wrong where Chipmunk has swapped the two shapes, as it
+            # does for a polygon that meets a disk or a segment.
+            abs(point.distance) > touch
             for hit in self.world.space.shape_query(shape)
             if hit.shape is not None
             and hit.shape.collision_type == by

@@ -227,6 +227,7 @@ int epoch_at(double t);
 int is_there(int obstacle, int epoch);
 int is_shared(int set, int obstacle, int face);
 int has_edge(int set, int obstacle, int edge);
+int back_of(int circle);
 int is_beside(int circle, int obstacle, int face);
 int corner_at(int obstacle, int side, double x, double y);
 int bounds(int corner, int obstacle, int side, int epoch);

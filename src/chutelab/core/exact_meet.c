@@ -376,19 +376,21 @@ static double distance_to_box(const Obstacle *o) {
 }
 
 /* A length of path on which a particle cannot meet anything but the obstacle that it touches and leaves, come past its ends,
-   or leave the scene. */
-static double clearance(void) {
+   or leave the scene; if it is shorter than `way`, a length up to `way`. */
+static double clearance(double way) {
     const double *box = A.given->exit_box, *up = A.given->up;
     double least = INFINITY, radius = A.given->radius;
+    int back = back_of(A.left);
     for (int n = 0; n < 2; n++) {
         double place = (n ? -up[0] : up[1]) * A.x + up[n] * A.y;
         least = MIN(least, MIN(place - box[n], box[2 + n] - place));
     }
-    for (int n = 0; n < O.tip_count; n++)
+    for (int n = 0; n < O.tip_count && least > way; n++)
         least = MIN(least, length_of(A.x - O.tips[n].x, A.y - O.tips[n].y) - radius);
-    for (int k = 0; k < O.count && least > 0.0; k++) {
+    for (int k = 0; k < O.count && least > way; k++) {
         const Obstacle *o = O.all + k;
-        if (k == A.left || o->met == END || !(fabs(o->rho) >= 0.0 || o->met == FACE)) continue;
+        /* The other face of an arc is behind its own. */
+        if (k == A.left || k == back || o->met == END || !(fabs(o->rho) >= 0.0 || o->met == FACE)) continue;
         double x = A.x - o->x, y = A.y - o->y;
         double off = o->met == FACE ? fabs(x * o->nx + y * o->ny) - radius : length_of(x, y) - fabs(o->rho);
         least = MIN(least, MAX(fabs(off), distance_to_box(o)));
@@ -418,7 +420,7 @@ double hop(const Motion *m, double until) {
     }
     double way = t * (speed + 0.5 * t * length_of(m->ax, m->ay));
     if (!(t > 0.0 && t < until)) return INFINITY;
-    if (way > A.free) A.free = clearance();
+    if (way > A.free) A.free = clearance(way);
     if (way > A.free) return INFINITY;
     A.free -= way;
     return t;

@@ -46,7 +46,7 @@ int has_edge(int set, int obstacle, int edge) {
 }
 
 /* The other face of an arc, or -1. */
-static int back_of(int circle) {
+int back_of(int circle) {
     if (circle < O.first_arc || circle >= O.first_arc + 2 * O.arcs) return NONE;
     return circle < O.first_arc + O.arcs ? circle + O.arcs : circle - O.arcs;
 }

@@ -9,12 +9,25 @@
 
 #define PI 3.14159265358979323846
 #define VISCOSITY 1.8e-5 /* Pa s; of air at 20 degrees */
+/* Greatest share of its speed that drag takes from a particle in a step: where it falls as fast as air lets it, halves of
+   a step are off by a twelfth of the square of that. */
+#define TAKES 0.05
 
 /* Deceleration divided by speed, 1/s. Newton's constant coefficient 0.44 holds from a Reynolds number of 1000 on. */
 static double relief(const Disk *d, double speed) {
     double r = d->broad, reynolds = 2 * r * speed * W.air / VISCOSITY, area = PI * r * r;
     if (reynolds >= 1000) return 0.22 * W.air * area * speed * d->inv_mass;
     return 6 * PI * VISCOSITY * r * (1 + 0.15 * pow(reynolds, 0.687)) * d->inv_mass;
+}
+
+/* Longest step, s, in which drag takes no more than that from any particle in flight. */
+double air_step(void) {
+    double most = INFINITY;
+    for (EACH_LIVE(i)) {
+        const Disk *d = W.disks + i;
+        if (d->mode == FREE) most = MIN(most, TAKES / relief(d, sqrt(square(d->vx) + square(d->vy))));
+    }
+    return most;
 }
 
 /* Apply the drag of the time since it last acted on a disk up to t; if t is earlier, undo it. */

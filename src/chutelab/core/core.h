@@ -412,6 +412,7 @@ void spread(double loss, int k);
 void give_back(const Contact *list, int count);
 
 /* air.c */
+double air_step(void);
 void slow_down(int i, double t);
 void begin_in_air(int i, double middle);
 

@@ -102,6 +102,7 @@ double choose_step(void) {
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     if (W.hinges) h = hinge_step(h);
     if (W.shakes > 0) h = MIN(h, shaken_step());
+    if (W.air > 0) h = MIN(h, air_step());
     W.usual = h;
     set_step(h);
     if (!W.interact) W.ledge = ledge_in(W.disks + W.low, h);

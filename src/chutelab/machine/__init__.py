@@ -7,7 +7,7 @@
   the core builds as it runs.
 """
 
-from chutelab.machine.builder import PASSES, ahead, build, chooses, hand_over
+from chutelab.machine.builder import PASSES, VISCOSITY, ahead, build, chooses, hand_over
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
     SWING,
@@ -23,7 +23,7 @@ from chutelab.machine.releases import RefusedError
 from chutelab.machine.shapes import Arcs, Pieces, Segments, apart, placed
 
 __all__ = [
-    "DRIVE_PULLEY", "PASSES", "SWING", "Arcs", "Caution", "Joint", "Machine", "Mover",
+    "DRIVE_PULLEY", "PASSES", "SWING", "VISCOSITY", "Arcs", "Caution", "Joint", "Machine", "Mover",
     "Particle", "Pieces", "Pulley", "RefusedError", "Segments", "ahead", "apart", "build",
     "chooses", "hand_over", "pace_of", "placed",
 ]  # fmt: skip

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import chain
-from math import ceil, inf, nan, prod
+from math import ceil, inf, nan, pi, prod
 from typing import Any
 
 import numpy as np
@@ -360,6 +360,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         streams=tuple(str(stream.name) for stream in scene.streams),
         plate_warnings=warnings,
     )
+    _weigh_in_air(machine)
     return machine.when(np.full(len(triggers), inf)) if triggers else machine
 
 
@@ -375,8 +376,8 @@ def chooses(scene: Scene) -> bool:
 def ahead(scene: Scene) -> Machine:
     """Return the machine of a scene; it is built when more than its keys is needed."""
     if (known := scene._ahead) is None:
-        if scene.hinges or scene.triggers:
-            # Hinges can be checked only after they are weighed.
+        if scene.hinges or scene.triggers or scene.air_density:
+            # Hinges, and what air slows down, can be checked only after they are weighed.
             return build(scene)
         without = {name: () for name in ("joints", "movers") if not getattr(scene, name)}
         only = {"build": build, "count": scene.count, "triggers": (), **without}
@@ -489,7 +490,11 @@ NEAR = 1e-9
 ONE_PLACE = "another place than the particle's at the release; a [[pin]] joins what is in one place"
 
 SWIFTEST = 1e5
-"""rad/s; the shortest time of a hinge is at least its inverse, as steps have to be shorter."""
+"""rad/s; the shortest time of a hinge, and that in which air stops a particle, is at least its
+inverse, as steps have to be shorter."""
+
+VISCOSITY = 1.8e-5
+"""Pa s; of air at 20 °C."""
 
 
 def _weigh_hinges(scene: Scene, movers: tuple[Mover, ...]) -> None:
@@ -509,6 +514,21 @@ def _weigh_hinges(scene: Scene, movers: tuple[Mover, ...]) -> None:
         else:
             continue
         raise RefusedError(scene.source, {0: fault})
+
+
+def _weigh_in_air(machine: Machine) -> None:
+    """Raise if air stops a slow particle (Stokes) sooner than steps can follow."""
+    if not np.any(machine.air):
+        return
+    least = 6.0 * pi * VISCOSITY * machine.broad / SWIFTEST
+    mass = np.broadcast_to(machine.particle.mass, machine.count)
+    if (mass >= least).all():
+        return
+    i = int((least / mass).argmax())
+    kind = f"[{machine.releases.kind[i]}]" if len(machine.scene.particles) > 1 else ""
+    text = f"at least {least[i]:.3g} kg with air_density: air stops it in less than 10 us"
+    fault = Fault(f"particle{kind}.mass", float(mass[i]), text)
+    raise RefusedError(machine.scene.source, {0: fault})
 
 
 def _judged(scenes: Scene | Family, nominal: NDArray[Any]) -> tuple[Caution, ...]:

@@ -30,7 +30,7 @@ from chutelab.engines.pymunk.faces import Bend, Flight, no_rims
 from chutelab.engines.pymunk.moving import Moving, Rolling, Ties
 from chutelab.engines.pymunk.shapes import Shapes
 from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Carriage, World
-from chutelab.machine import SWING, Machine
+from chutelab.machine import SWING, VISCOSITY, Machine
 from chutelab.results.loads import Bins
 from chutelab.results.recorder import EnoughError, Recorder, Tracks
 from chutelab.results.rows import REASONS, Kind
@@ -50,8 +50,8 @@ CALM, STILL = 0.1, 1e-3
 """s divided by `Machine.pace`, and m/s times it: a particle that is slower for so long has
 settled."""
 
-VISCOSITY = 1.8e-5
-"""Pa s; of air at 20 °C."""
+TAKES = 0.05
+"""Greatest share of its speed that drag takes from a particle in a step."""
 
 _BODY = (
     batch.BodyFields.BODY_ID
@@ -108,7 +108,10 @@ class Shared:
         if any(mover.hinge for mover in machine.movers):
             self.t = self.begin = min(self.begin, 0.0)
         span = machine.end_time - self.begin
-        self.most = ceil(span / machine.step_of("pymunk") - 1e-9)
+        longest = machine.step_of("pymunk")
+        if machine.air:
+            longest = min(longest, TAKES / self._relief(np.hypot(*starts.velocity.T)).max())
+        self.most = ceil(span / longest - 1e-9)
         self.h, self.steps, self.clock = span / max(self.most, 1), 0, 0
         self.waiting = [
             i for i in starts.t.argsort(kind="stable").tolist() if starts.t[i] < machine.end_time
@@ -459,23 +462,21 @@ class Shared:
                 normal_impulse=push[told], tangential_impulse=rub[told],
             )  # fmt: skip
 
+    def _relief(self, speed: Floats) -> Any:
+        """Return deceleration by air over speed, 1/s (Schiller and Naumann, 1933)."""
+        reynolds = 2.0 * self.broad * speed * self.machine.air / VISCOSITY
+        coefficient = np.where(
+            reynolds < 1000.0, 24.0 * (1.0 + 0.15 * reynolds**0.687), 0.44 * reynolds
+        )
+        return coefficient * np.pi * self.broad * VISCOSITY / (4.0 * self.machine.particle.mass)
+
     def _slow_down(self) -> None:
         """Apply half a step of air drag to all free particles, as spheres; book the loss."""
-        air, p, r = self.machine.air, self.machine.particle, self.broad
-
-        def relief(speed: Floats) -> Any:
-            # Schiller and Naumann (1933); deceleration over speed, 1/s.
-            reynolds = 2.0 * r * speed * air / VISCOSITY
-            coefficient = np.where(
-                reynolds < 1000.0, 24.0 * (1.0 + 0.15 * reynolds**0.687), 0.44 * reynolds
-            )
-            return coefficient * np.pi * r * VISCOSITY / (4.0 * p.mass)
-
         v = self.state[1, 2:4, : self.count]
         speed = np.hypot(*v)
-        middle = speed * np.exp(-0.25 * self.h * relief(speed))
-        left = np.where(self.free, np.exp(-0.5 * self.h * relief(middle)), 1.0)
-        lost = 0.5 * p.mass * (v**2 * (1.0 - left**2)).sum(axis=0)
+        middle = speed * np.exp(-0.25 * self.h * self._relief(speed))
+        left = np.where(self.free, np.exp(-0.5 * self.h * self._relief(middle)), 1.0)
+        lost = 0.5 * self.machine.particle.mass * (v**2 * (1.0 - left**2)).sum(axis=0)
         v *= left
         self.entries[2, : self.count] += lost
         self.recorder.air_loss += float(lost.sum())

@@ -19,7 +19,7 @@ import chutelab
 import shared
 from chutelab import scene
 from chutelab.checks import agreement  # noqa: F401 - or it would keep what a test puts in
-from chutelab.checks.stress import LAWS, Verdict
+from chutelab.checks.stress import LAWS, Evidence, Verdict, judge
 from chutelab.cli import main
 from chutelab.engines.simulation import follow
 from chutelab.machine import build
@@ -54,6 +54,25 @@ def test_each_law_is_a_line_with_figure_and_bound():
     assert all(0.0 <= float(figure) <= float(bound) for _, figure, bound, _ in rows)
     assert shown.endswith("\nall 14 laws kept\n")
     assert max(len(line) for line in shown.splitlines()) <= 80
+
+
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+def test_kinds_that_pass_through_each_other_overlap_by_law(engine):
+    """The first two cross slowly, and the third is released inside the second; alone it is not."""
+    stream = {"velocity": [0.0, 0.0], "interact": True}
+    tables = {
+        "gravity": 0.0,
+        "particle": [{"name": name, "radius": 0.02, "mass": 0.01} for name in "ab"],
+        "pair": [{"between": ["a", "b"], "meet": False}],
+        "stream": [
+            stream | {"at": [0.0, 0.0], "velocity": [0.1, 0.0], "particle": "a"},
+            stream | {"at": [0.05, 0.0], "particle": "b"},
+            stream | {"at": [0.05, 0.01], "start": 0.05, "particle": "a"},
+        ],
+        "run": {"until": 0.25},
+    }
+    run = Evidence(chutelab.simulate(tables, engine=engine))
+    assert not [one for one in judge(run) if one.broken]
 
 
 def test_the_scene_is_changed_and_run_as_told():

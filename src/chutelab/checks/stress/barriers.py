@@ -90,6 +90,11 @@ class Evidence:
         kinds = np.array([outline is not None for outline in self.machine.outlines])
         return kinds[self.machine.releases.kind]
 
+    def meet(self, i: Any, j: Any) -> Bools:
+        """Whether particles i and j, numbers or (k,), do not pass through each other."""
+        kind = self.machine.releases.kind
+        return np.asarray(self.machine.pair_restitution[kind[i], kind[j]] >= 0.0)
+
     @cached_property
     def movers(self) -> dict[int, Mover]:
         """What moves, by the index of its surface."""
@@ -201,9 +206,10 @@ def overlap(e: Evidence) -> Verdict | None:
     for now in np.concatenate([_instants(e), _few(e.recording.select(Kind.COLLISION))["t"]]):
         (position,), _ = e.recording.at([now])
         there = np.flatnonzero(np.isfinite(position[:, 0]))
-        deep, i, j = closest(position[there], e.radii[there])
+        pairs = there[_neighbours(position[there, 0], 2.0 * e.radius)]
+        deep, i, j = closest(position, e.radii, pairs[:, e.meet(*pairs)])
         if deep > 0.0:
-            found.append((deep, f"particles {there[i]} and {there[j]} at t = {now:.6g} s"))
+            found.append((deep, f"particles {i} and {j} at t = {now:.6g} s"))
     return worst(found, e.bounds.rounding + 2.0 * e.bounds.late, "m")
 
 
@@ -271,6 +277,7 @@ def _pairs(e: Evidence, dt: float) -> Iterator[tuple[float, Ints, Floats, Floats
         i, j = pairs = there[_neighbours(first[there, 0], room)]
         before, after = first[j] - first[i], last[j] - last[i]
         touch = np.minimum(np.hypot(*before.T), np.hypot(*after.T)) < e.radii[i] + e.radii[j]
+        touch &= e.meet(i, j)
         if touch.any():
             yield float(now), pairs[:, touch], before[touch], after[touch]
 
@@ -285,9 +292,12 @@ def _neighbours(x: Floats, room: float) -> Ints:
     return order[np.stack([left, right])]
 
 
-def closest(position: Floats, radius: Floats) -> tuple[float, int, int]:
-    """Deepest overlap (m, negative if there is none) of disks (n, 2) and (n,), and of which two."""
-    i, j = _neighbours(position[:, 0], 2.0 * radius.max(initial=0.0))
+def closest(position: Floats, radius: Floats, pairs: Ints | None = None) -> tuple[float, int, int]:
+    """Deepest overlap of disks (n, 2) and (n,), m, and of which two; negative if there is none.
+
+    `pairs`, (2, k), are those that are looked at; default: all.
+    """
+    i, j = _neighbours(position[:, 0], 2.0 * radius.max(initial=0.0)) if pairs is None else pairs
     if not len(i):
         return -inf, 0, 0
     deep = radius[i] + radius[j] - np.hypot(*(position[j] - position[i]).T)
@@ -355,6 +365,7 @@ def released_free(e: Evidence) -> Verdict | None:
         (place,), _ = e.recording.at([event["t"]])
         apart = np.nan_to_num(np.hypot(*(place - event["position"]).T), nan=inf)
         deep = e.radii[event["particle"]] + e.radii - apart
+        deep[~e.meet(event["particle"], np.arange(len(deep)))] = -inf
         deep[event["particle"]] = -inf
         other = int(np.argmax(deep))
         where = f"particle {event['particle']} in {other} at t = {event['t']:.6g} s"

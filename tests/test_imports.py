@@ -135,6 +135,7 @@ def test_what_docstrings_and_texts_name_is_there():
 
 OWN = {
     "core.h": "contact",
+    "joint.h": "contact",
     "shape.h": "contact",
     "exact.h": "exact",
     "exact_pieces.h": "exact",

@@ -835,6 +835,28 @@ def test_a_tip_that_comes_to_where_two_walls_meet_is_above_the_floor(tilt, mu):
     assert recording.ends()[1]["position"][0, 1] == pytest.approx(height, abs=3e-7)
 
 
+@pytest.mark.parametrize("gap", [1e-8, 1e-7])
+def test_a_corner_that_passes_the_tip_of_two_walls_outside_is_not_struck_from_inside(gap):
+    """A box moves along its own edge, a little above the tip: nothing is in its way.
+
+    Before its corner gets there, it crosses the line by which a wall would continue.
+    """
+    size, tilt, speed = [0.004, 0.01], 0.035, 0.8
+    walls = [[0.05, 0.001], [0.0, 0.0], [-0.04, -0.04]]
+    along, out = np.array([cos(tilt), sin(tilt)]), np.array([-sin(tilt), cos(tilt)])
+    middle = (0.5 * size[0] - 5e-4) * along + (gap + 0.5 * size[1]) * out
+    run = chutelab.simulate({
+        "gravity": 0.0, "particle": {"shape": "box", "size": size, "mass": 0.01},
+        "surface": [{"name": "walls", "points": walls, "restitution": 0.5}],
+        "stream": {"at": middle.tolist(), "velocity": (speed * along).tolist(),
+                   "angle_deg": degrees(tilt)},
+        "run": {"until": 0.02, "engine": "contact"},
+    })  # fmt: skip
+    assert {*run.events["kind"].tolist()} == {chutelab.Kind.RELEASE}
+    end = run.ends()[1]["velocity"][0]
+    assert end == pytest.approx(speed * along, rel=1e-12)
+
+
 @pytest.mark.parametrize("angle", [52.0, 116.0, 188.0, 268.0, 336.0])
 def test_what_a_blow_on_something_round_spins_strikes_it_with_its_next_corner(angle):
     """Within the step: its first corner leaves as the next comes, at some 370 rad/s.

@@ -265,9 +265,12 @@ static int is_inside(const Shape *a, const Surface *s, double px, double py) {
 }
 
 /* How far beyond an end of a segment a corner on one of its sides may be and still be on the segment: only rounding, unless
-   the segment continues smoothly, or another one continues to that side, where a corner beyond the end is through that. */
-static double past_end(const Surface *s, int end, int side, double near) {
-    return mate_of(s, end) < 0 && !(s->hollows[end] & (side > 0 ? 1 : 2)) ? ROUNDED * near : near;
+   the segment continues smoothly, or the particle is on that side and another segment continues to it: there a corner beyond
+   the end is through that one. */
+static double past_end(const Shape *a, const Surface *s, int end, int side, double near) {
+    double mid = (a->y - s->y) * s->tx - (a->x - s->x) * s->ty;
+    int hollow = mid * side > 0 && (s->hollows[end] & (side > 0 ? 1 : 2));
+    return mate_of(s, end) < 0 && !hollow ? ROUNDED * near : near;
 }
 
 /* Find what a candidate is on, and fill in its place; return 0 if it doesn't touch there. */
@@ -279,7 +282,7 @@ int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
             double along = (q[0] - b->s->x) * b->s->tx + (q[1] - b->s->y) * b->s->ty;
             t->on = side_of(a, b->s, t->which, near);
             fill_in(a, b, t);
-            return along >= -past_end(b->s, 0, t->on, near) && along <= b->s->length + past_end(b->s, 1, t->on, near);
+            return along >= -past_end(a, b->s, 0, t->on, near) && along <= b->s->length + past_end(a, b->s, 1, t->on, near);
         }
         if (b->s) {
             double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);

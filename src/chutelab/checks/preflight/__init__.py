@@ -301,22 +301,8 @@ def advice(
             " run and keeps what is recorded",
             {},
         )
-    waited = None if tried.recording is None else waits(tried.recording)
-    if tried.recording is not None and waited is not None and waited.particles:
-        # Each waits for all that waited before it.
-        released = int(np.count_nonzero(tried.recording.released))
-        stream = scene.stream
-        period = 1.0 / stream.rate + waited.longest / max(1, released - 1)
-        rate: Any = (1.0 - MARGIN) / period
-        # In the unit in which it was given.
-        tonnes = 3.6 * (stream.mass_rate or 0.0) * (rate / stream.rate)
-        rate = f"{_down(tonnes):g} t/h" if stream.mass_rate is not None else _down(rate)
-        key = "stream.rate" if len(scene.streams) == 1 else "stream[0].rate"
-        yield _advised(
-            f"of {released} particles tried, {waited}",
-            {key: rate},
-            after=", or a larger stream.bed_height",
-        )
+    if tried.recording is not None:
+        yield from _waiting(scene, tried.recording)
     start, rides = machine.releases, machine.releases.carried
     radius = np.broadcast_to(machine.particle.radius, machine.count)[rides]
     pressed = squeeze(scene, start.t[rides], start.position[rides], radius)
@@ -408,6 +394,28 @@ def _shortened(points: Floats, machine: Machine, other: int) -> Iterator[list[li
 def _belt_height(machine: Machine) -> float:
     """Return y of the outgoing belt, m."""
     return float(machine.segments.start[machine.segments.surface == machine.landing][0, 1])
+
+
+def _waiting(scene: Scene, recording: Recording) -> Iterator[Advice]:
+    """Advise on releases that wait, unless they come slower by less than `MARGIN`."""
+    waited, stream = waits(recording), scene.stream
+    if waited is None:
+        return
+    released = int(np.count_nonzero(recording.released))
+    # Each waits for all that waited before it.
+    later = waited.longest / max(1, released - 1)
+    if later * stream.rate <= MARGIN:
+        return
+    rate: Any = (1.0 - MARGIN) / (1.0 / stream.rate + later)
+    # In the unit in which it was given.
+    tonnes = 3.6 * (stream.mass_rate or 0.0) * (rate / stream.rate)
+    rate = f"{_down(tonnes):g} t/h" if stream.mass_rate is not None else _down(rate)
+    key = "stream.rate" if len(scene.streams) == 1 else "stream[0].rate"
+    yield _advised(
+        f"of {released} particles tried, {waited}",
+        {key: rate},
+        after=", or a larger stream.bed_height",
+    )
 
 
 def _ending(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice]:

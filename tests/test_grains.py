@@ -65,18 +65,20 @@ def test_the_summary_says_when_quarters_fell_out(tmp_path):
 
 
 @pytest.mark.slow
-def test_disks_run_as_fast_to_the_end():
+def test_disks_run_nearly_as_fast_to_the_end():
     """A tank of water, whose level falls by as much, would take (√¾ - √½) / (√½ - √¼) for it.
 
-    That is the time of the third quarter over that of the second. Of one bin it scatters by 0.17.
+    That is the time of the third quarter over that of the second. Of one bin it scatters by 0.16.
     """
     times = [
         quarters(simulate(scene_of(find(10), "slot.toml", (f"stream.seed={seed}",))))
-        for seed in range(1, 9)
+        for seed in range(1, 31)
     ]
     shares = np.array([(last - half) / (half - first) for first, half, last in times])
     error = shares.std(ddof=1) / len(shares) ** 0.5
-    assert shares.mean() == pytest.approx(1.0, abs=3.0 * error)
+    assert "takes a sixth longer than the second" in explained(10)
+    assert shares.mean() == pytest.approx(7.0 / 6.0, abs=2.0 * error)
+    assert "a tank of water would take a third longer" in explained(10)
     water = (0.5**0.5 - 0.25**0.5) / (0.75**0.5 - 0.5**0.5)
     assert shares.mean() + 3.0 * error < water
 
@@ -88,12 +90,12 @@ def test_flows_are_those_of_the_table_and_grow_as_the_law_says():
     for width, mean, spread, root in table:
         flows = np.array([flow(bin_of(int(width) / 1000.0, seed)) for seed in SEEDS])
         held = int(np.isnan(flows).sum())
-        assert held == {"24": 4}.get(width, 0)
+        assert held == {"24": 5, "30": 1}.get(width, 0)
         assert f"{np.nanmean(flows):.0f}" == mean
         assert np.nanstd(flows) == pytest.approx(float(spread), abs=0.51)
         widths.append(float(width))
         roots.append(float(root))
-    assert "four of ten bins did not run out; through 30 mm all ten did" in explained(10)
+    assert "five of ten bins did not run out; through 30 mm one of ten." in explained(10)
     rise, begin = np.polyfit(widths, roots, 1)
     assert f"meets the axis at about {-begin / rise:.0f} mm" in explained(10)
     # The power that fits best, with the same loss at the edges, is 3/2 within its scatter.
@@ -168,12 +170,15 @@ def test_a_single_disk_rolls_from_a_slope_of_c_on(slope, moves):
 
 @pytest.mark.slow
 def test_angles_of_heaps_are_as_the_explanation_says():
-    """Means of 25 heaps have a standard error of 1 degree at most: so well they are told."""
+    """Means of 25 heaps have a standard error of 1 degree at most: so well they are told.
 
-    def poured(*settings):
-        heaps = [heap(seed, *settings) for seed in range(25)]
+    Heights are compared in the means of 60.
+    """
+
+    def poured(*settings, count=25):
+        heaps = [heap(seed, *settings) for seed in range(count)]
         angles = np.mean([flanks(one) for one in heaps], axis=1)
-        assert np.std(angles) / np.sqrt(24.0) <= 1.0
+        assert np.std(angles) / np.sqrt(count - 1.0) <= 1.0
         heights = [one.ends()[1]["position"][:, 1].max() for one in heaps]
         return np.mean(angles), np.std(angles), np.mean(heights)
 
@@ -181,14 +186,15 @@ def test_angles_of_heaps_are_as_the_explanation_says():
         (number,) = re.findall(text.replace("N", r"(\d+)"), explained(11))
         return pytest.approx(float(number), abs=1.0)
 
-    usual, spread, height = poured()
+    usual, spread, _ = poured()
     assert poured("particle.rolling_friction=0.1")[0] == told("a heap of N° or so")
     assert usual == told("with 0.3 one of N°")
     assert poured("particle.rolling_friction=0.8")[0] == told("with 0.8 one of N°")
     slides = poured("stream.friction=0.2", "surface.floor.friction=0.2")
     assert slides[0] == told("a heap has some N°")
     assert spread == told("scatters by N° or so from seed to seed")
-    half = poured("stream.count=75")
+    usual, _, height = poured(count=60)
+    half = poured("stream.count=75", count=60)
     assert half[0] == told("The smaller ones have N°")
     assert poured("stream.count=75", "stream.rate=40")[0] == told("half as fast they have N°")
     # Triangles of area A have the height √(A tan α).
@@ -199,9 +205,9 @@ def test_angles_of_heaps_are_as_the_explanation_says():
 
 
 @pytest.mark.slow
-def test_about_six_of_ten_disks_that_roll_freely_leave_the_floor():
-    assert "About six of ten roll off the floor" in explained(11)
+def test_about_half_of_the_disks_that_roll_freely_leave_the_floor():
+    assert "About half of them roll off the floor" in explained(11)
     heaps = [heap(seed, "particle.rolling_friction=0") for seed in range(20)]
     gone = [len(one.select(Kind.EXIT)) / one.count for one in heaps]
-    assert np.mean(gone) == pytest.approx(0.6, abs=0.06)
+    assert np.mean(gone) == pytest.approx(0.5, abs=0.06)
     assert np.std(gone) / 19.0**0.5 < 0.04

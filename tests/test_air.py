@@ -191,7 +191,7 @@ def test_a_box_is_slowed_down_as_a_sphere_whose_disk_has_its_area():
 
 
 def test_what_does_not_have_it_says_so():
-    with pytest.raises(SceneError, match=r"air_density = 1\.2: 0 with the exact engine"):
+    with pytest.raises(SceneError, match=r"air_density = 1\.2: must be 0 with the exact engine"):
         simulate(thrown("exact"))
     with pytest.raises(SceneError, match="air_density = -1"):
         thrown(air=-1.0)

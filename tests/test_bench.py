@@ -116,7 +116,7 @@ def test_a_crowd_is_judged_as_a_whole_and_exact_cannot_run_it():
     scene = load("stream", ["stream.count=3", "run.until=landed"])
     rows = measure(scene, steps=(1e-3,), repeats=0)
     assert [one.method for one in rows] == ["exact", "contact", "pymunk"]
-    assert rows[0].failed == "contact or pymunk, because stream.interact = true"
+    assert rows[0].failed == "must be contact or pymunk, because stream.interact = true"
     assert rows[0].median is None
     assert [one.against for one in rows[1:]] == ["pymunk", "contact"]
     assert all(one.how.startswith("of the crowd as a whole") for one in rows[1:])

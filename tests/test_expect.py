@@ -265,9 +265,10 @@ def test_the_theory_is_asked_for_its_own_symbols_only():
     ("more", "engines", "skipped"),
     [
         ("[particle]\nradius = 0\n", ["exact"],
-         {name: f'more than 0 with run.engine = "{name}"' for name in ("contact", "pymunk")}),
+         {name: f'must be more than 0 with run.engine = "{name}"'
+          for name in ("contact", "pymunk")}),
         ("[stream]\ncount = 3\ninteract = true\nrate = 20\n", ["contact", "pymunk"],
-         {"exact": "contact or pymunk, because stream.interact = true"}),
+         {"exact": "must be contact or pymunk, because stream.interact = true"}),
         (f"[stream]\ncount = {MOST_ALONE + 1}\n", ["exact", "contact"],
          {"pymunk": f"of {MOST_ALONE + 1} particles that do not meet it runs particle 0 alone"}),
     ],

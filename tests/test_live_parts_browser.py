@@ -12,12 +12,15 @@ from chutelab.machine import build
 from chutelab.pictures.live import html
 from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
 from chutelab.scene import from_dict, load
-from chutelab.scene.look import HINGED, JOINTS, MOTIONS
+from chutelab.scene.look import JOINTS, MOTIONS
 from chutelab.util.words import words
 from live.browser import DONE, axe, spot
 from shared import call
 
 expect = pytest.importorskip("playwright.sync_api").expect
+
+HINGED = {"hinge", "mass", "inertia", "spring", "rest_deg", "damper", "stops_deg", "motor"}
+"""Keys of a hinge."""
 
 # Of a run that is over: knots of each track as Python has them, states and entries.
 TRACKS = """chutelab.lab.recording.tracks.map(({ rows, count }) =>

@@ -3,7 +3,8 @@
 Text and JSON go to standard output, a progress bar, which appears after a second, to standard
 error. Exit codes: 0: done. 1: chutelab failed, ``verify`` or ``stress`` found a broken promise, a
 run broke a law, or an accuracy was not reached. 2: invalid input. 130: interrupted with Ctrl-C.
-143: terminated. 129: the terminal was closed. 143 and 129 leave no files behind; 130 leaves only
+143: terminated. 129: the terminal was closed. 141: the reader of its output has gone, as `head`
+does, which is no failure and gets no message. 143 and 129 leave no files behind; 130 leaves only
 those of what ``run --out`` had recorded.
 """
 
@@ -36,8 +37,17 @@ if TYPE_CHECKING:
     from rich.segment import Segment
 
 
+UNREAD = 141
+"""Exit code, as of tools that SIGPIPE (13) ends."""
+
+
 class _Output(io.TextIOWrapper):
-    """Standard output; its errors say "standard output", since it has no file name."""
+    """Standard output; its errors say "standard output", since it has no file name.
+
+    If its reader has gone, what is still printed on the way out is dropped.
+    """
+
+    _unread = False
 
     def write(self, text: str, /) -> int:
         with self._named():
@@ -51,6 +61,10 @@ class _Output(io.TextIOWrapper):
     def _named(self) -> Iterator[None]:
         try:
             yield
+        except BrokenPipeError:
+            if not self._unread:
+                self._unread = True
+                raise click.exceptions.Exit(UNREAD) from None
         except OSError as error:
             raise OSError(error.errno, error.strerror, "standard output") from None
 

@@ -231,8 +231,7 @@ def follow(
                 a, b = (recorder.machine.surfaces[surface] for surface in exact.other)
                 raise CornerError(
                     f"particle {exact.lone}, a spinning disk, is held between {a!r} and {b!r}, of"
-                    " which one moves; the exact engine cannot follow that: run it with"
-                    ' engine = "contact"'
+                    " which one moves: the exact engine cannot follow that"
                 )
             if (why := stuck(course, exact.passed)) and stalled is None:
                 stalled = StalledError(exact.lone, exact.t, (exact.x, exact.y), why)

@@ -194,7 +194,8 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
             return Recording.of(run(machine, progress))
         except CornerError as error:
             if "exact" in (engine, machine.scene.run.engine):
-                raise refused(machine.scene, "run.engine", "exact", str(error)) from error
+                allowed = f"contact, because {error}"
+                raise refused(machine.scene, "run.engine", "exact", allowed) from error
             name = "contact"
             must_fit(machine, name)
     if name == "contact":
@@ -294,4 +295,4 @@ TAUT = 1e-9
 
 def refused(scene: Scene, key: str, value: object, allowed: str) -> SceneError:
     """Return the error that says which part of a scene cannot be run."""
-    return SceneError(scene.source, [Fault(key, value, allowed)])
+    return SceneError(scene.source, [Fault(key, value, f"must be {allowed}")])

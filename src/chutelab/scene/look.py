@@ -20,11 +20,6 @@ JOINTS: Final = ("string", "rod", "spring", "pin")
 MOTIONS: Final = ("turn", "shake", "travel")
 """Keys by which the motion of a surface is prescribed."""
 
-HINGED: Final = (
-    "hinge", "mass", "inertia", "spring", "rest_deg", "damper", "stops_deg", "motor",
-)  # fmt: skip
-"""Keys of a hinge."""
-
 WAITS = ("opens_when", "closes_when", "starts_when")
 """Keys of triggers, which wait until another surface is touched."""
 

@@ -122,7 +122,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         examples = {name: describe(load(name))["scene"] for name in EXAMPLES}
         return {"scene": {"stream": []}, **common, "examples": examples}
     cornered = [*uncornered(build(scene))] if scene.cornered else []
-    faults = [Fault(*why) for why in cornered]
+    faults = [Fault(key, value, f"must be {allowed}") for key, value, allowed in cornered]
     lacks: Counter[str] = Counter()
     foreign = {
         n
@@ -134,13 +134,15 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         many = sum(s.count for s, its in zip(scene.streams, scene.kinds, strict=True) if its == n)
         lacks[kind.shape if kind.outline else "point"] += many
         if not kind.outline:
-            allowed = "more than 0; a page that answers shows what has a size"
+            allowed = "must be more than 0; a page that answers shows what has a size"
             faults.append(Fault(f"{table}.radius", 0.0, allowed))
     # Joints refer to numbers of particles, some of which would be left out.
     lacks += Counter(table for table, _ in scene.joints if foreign)
     for n, pair in enumerate(scene.pair):
         if (key := pair.clings) and scene.hinges:
-            text = "0 with what hangs on hinges: the contact engine, which pages run, has not both"
+            text = (
+                "must be 0 with what hangs on hinges: the contact engine, which pages run, lacks it"
+            )
             faults.append(Fault(f"pair[{n}].{key}", getattr(pair, key), text))
             partly = False
     if partly:
@@ -158,7 +160,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         common |= {"lacks": dict(lacks), "source": scene.source}
     machine, out = build(scene), scene.outgoing
     if machine.joints and not lacks and (why := unjoined(machine)):
-        text = f"other than in this scene: {why}"
+        text = f"must be other than in this scene: {why}"
         raise SceneError(scene.source, [Fault(machine.joints[0].kind, None, text)])
     if out is not None and out.drop_from == "impact":
         height = machine.segments.start[machine.segments.surface == machine.landing][0, 1].item()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import chutelab
+from chains import tables
 from chutelab.checks import stress as laws
 from chutelab.checks.agreement import verify
 from chutelab.checks.stress import Evidence
@@ -42,6 +43,28 @@ def test_so_they_are_in_a_crowd_that_rides_collides_and_settles(engine):
     run.impulses.flags.writeable = True
     run.impulses["force"][70, 2] += 1e-7
     assert not balance(run).holds
+
+
+@pytest.mark.parametrize("seed", [1988, 2676, 2721])
+def test_what_rests_in_a_wedge_that_locks_presses_no_harder_with_time(seed):
+    """Statics leaves open how hard both walls press, but at rest nothing changes: not the forces,
+    which balance the weight and can be a few times as large, nor the energy lost."""
+    drawn = tables(seed)
+    drawn["run"] |= {"until": 1.6, "loads": 0.1}
+    run = chutelab.simulate(drawn, engine="contact")
+    loads = [run.loads(row["name"]) for row in drawn["surface"]]
+    held = [load for load in loads if load.normal[14] > 0.0]
+    assert len(held) == 2
+    mass, gravity = drawn["particle"]["mass"], drawn["gravity"]
+    weight = mass * gravity
+    assert sum(load.force[14] for load in held) == pytest.approx([0.0, -weight], abs=1e-6 * weight)
+    for load in held:
+        assert load.normal[14] == pytest.approx(load.normal[10], rel=0.01)
+        assert load.normal[14] < 10.0 * weight
+    lost, y = run.by_surface[:, 1:], run.at([0.0, 1.6])[0][:, 0, 1]
+    brought = 0.5 * mass * np.square(drawn["stream"]["velocity"]).sum()
+    assert lost.min() >= -1e-9
+    assert lost.sum() == pytest.approx(brought + weight * (y[0] - y[-1]), rel=0.01)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

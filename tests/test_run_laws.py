@@ -160,6 +160,12 @@ def test_a_flight_through_the_floor_is_no_event_and_is_seen(engine):
     assert "do not trust" in str(one)
 
 
+@pytest.mark.parametrize("seed", [711, 2311])
+def test_a_path_inside_an_arc_that_ends_short_of_the_disks_centre_is_bent_by_it(seed):
+    """A first chord may give m (v² dt / 2 (R - r))² / 2, also if no knot is in the arc's box."""
+    assert laws.judge(contact.run(build(chains.draw(seed)))) == ()
+
+
 @pytest.mark.parametrize(("side", "seen"), [(0.99, True), (1.01, False)])
 def test_a_disk_that_clips_an_end_between_knots_is_seen(side, seen):
     """It flies past the end of a wall at ever the same distance of 0.99 or 1.01 radii."""

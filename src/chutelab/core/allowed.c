@@ -23,6 +23,8 @@
 #define LEAVES_OUT 1e-4
 /* Share of the radius by which the pymunk engine enlarges its disks, and so their levers. */
 #define HAIR 1e-10
+/* Radii by which a particle may be off the circle on which it moves inside an arc. */
+#define OFF_CIRCLE 0.1
 
 struct Sums All;
 
@@ -154,25 +156,27 @@ int are_finite(void) {
 
 /* Greatest acceleration of a particle towards the centre of an arc, m/s2, over those of its knots that are inside. */
 static double bent_by(const Barrier *b, double r, int first, int end) {
-    double inner = b->radius - r, low = MAX(inner - 0.1 * r, 0), found = 0;
+    double inner = b->radius - r, low = MAX(inner - OFF_CIRCLE * r, 0), found = 0;
     if (b->mover) return inner > 0 ? square(L.speed) / inner : 0;
     for (int k = first; k < end && inner > 0; k++) {
         const double *knot = KNOT(k);
         double far = square(knot[1] - b->x) + square(knot[2] - b->y);
-        if (far < square(low) || far >= square(inner + 0.1 * r)) continue;
+        if (far < square(low) || far >= square(inner + OFF_CIRCLE * r)) continue;
         if (is_within(b, knot[1], knot[2], 0)) found = MAX(found, speed_squared(knot) / inner);
     }
     return found;
 }
 
-/* The same over all particles and pieces. Outside an arc the acceleration is never above that of gravity, as a faster
-   particle lifts off. No particle is inside the drive pulley. */
+/* The same over all particles and pieces. The centre of a particle that an arc bends is beside the arc, by its radius.
+   Outside an arc the acceleration is never above that of gravity, as a faster particle lifts off. No particle is inside
+   the drive pulley. */
 PAIRED static double bent_inside(void) {
     double found = 0;
     int bent = 0;
     for (int n = 0; n < L.piece_count - (L.pulley != 0); n++) bent += L.barriers[n].radius > 0;
     for (int i = 0; i < L.particle_count && bent; i++) {
         double r = L.bodies[i].radius;
+        Two reach = both((1 + OFF_CIRCLE) * r);
         for (int first = L.offsets[i], end; first < L.offsets[i + 1]; first = end) {
             Two low = two_at(KNOT(first) + 1), high = low;
             for (end = first + 1; end < MIN(first + WIDTH, L.offsets[i + 1]); end++) {
@@ -182,7 +186,7 @@ PAIRED static double bent_inside(void) {
             }
             for (int n = 0; n < L.piece_count - (L.pulley != 0); n++) {
                 const Barrier *b = L.barriers + n;
-                int is_off = is_any((low > two_at(b->box + 2)) | (high < two_at(b->box)));
+                int is_off = is_any((low - reach > two_at(b->box + 2)) | (high + reach < two_at(b->box)));
                 if (b->radius > 0 && !is_off) found = MAX(found, bent_by(b, r, first, end));
             }
         }

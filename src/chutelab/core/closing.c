@@ -1,6 +1,7 @@
 /* After the solve of a step: what lasting contacts do to the ledger, which of them stick, slip or open, which disks come
    to rest, and how tracks end in contact. */
 
+#include <string.h>
 #include "core.h"
 
 /* Smallest number of steps that a contact in a crowd has to last for its end to be recorded as a separation. */
@@ -59,6 +60,10 @@ static void tell_arrival(const Contact *c, int kind, double past, double h) {
     write_event(kind, c->i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);
     if (is_alone(c, &d->ux)) keep_impulse(c, -1, W.t - past, W.t + 0.5 * h);
 }
+
+/* Forget the loads of a disk that does not lie on a single surface in this step: nothing may be extrapolated from them
+   later. */
+static void forget_loads(Track *track) { memset(track->load, 0, sizeof track->load); }
 
 /* Record whether a disk in contact with one surface slips there, sticks, or has come to rest. */
 static void note_grip(Disk *d, const Contact *c, const double *u, const double *v, double h) {
@@ -150,8 +155,7 @@ static void settle(int i, const Contact *last, double h) {
 static void tell_separation(int i) {
     const Disk *d = W.disks + i;
     const Track *track = W.tracks + i;
-    /* In a crowd the loads may be old: they are noted only while the disk lies on a single surface. */
-    if (track->lasted < 3 || d->t - track->load_t[2] > 4 * W.dt) {
+    if (track->lasted < 3 || track->load[2] == 0) {
         event_here(SEPARATION, i, track->ground);
         return;
     }
@@ -317,13 +321,17 @@ void close_step(double h) {
         d->ends = -1;
         d->lies = d->supports > 0;
         d->whirl = d->lies ? MAX(d->whirl, whirl_of(d)) : 0;
-        if (d->mode != FREE) continue;
+        if (d->mode != FREE) {
+            forget_loads(track);
+            continue;
+        }
         settle_down(d, h);
         if (!d->supports) {
             if (!is_tied(i) || square(d->vx) + square(d->vy) > square(CALM * W.pace)) d->calm = 0;
             if (track->stays >= (W.interact ? LASTS : 3)) tell_separation(i);
             if (track->lasted || track->stays) d->on = -1;
             track->stays = 0;
+            forget_loads(track);
             flush_track(i);
             if (d->kick[0] != 0 || d->kick[1] != 0) {
                 knot_before(i, d->t, d->ux, d->uy, d->uspin);
@@ -364,6 +372,7 @@ void close_step(double h) {
             }
             if (ground < 0 && track->stays >= LASTS) event_here(SEPARATION, i, track->ground);
             if (track->ground != ground) track->stays = 0;
+            forget_loads(track);
             d->slips = 1;
             d->on = ground;
         }

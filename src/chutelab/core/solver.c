@@ -160,20 +160,22 @@ static double bends(const Contact *c, double h) {
 }
 
 /* Solve the contacts of a lone disk such that its gaps are closed at the place that its impulses lead to, by repeating the solve
-   as long as corrections shrink. Else it would sink into the inside of an arc, step by step. */
+   as long as corrections shrink. Else it would sink into the inside of an arc, step by step. The next step begins with the
+   corrections that the last solve leaves. */
 static void solve_alone(Contact *list, int count) {
     double h = W.step_end - W.t, r = W.disks[list->i].radius;
     for (double last = INFINITY;;) {
         double most = 0;
         sweep_contacts(list, count, 0, W.sweeps, W.sweeps, W.accurate, MAX(W.accurate, 1e-9 * W.pace));
         for (int n = 0; n < count; n++) most = MAX(most, fabs(bends(list + n, h) - list[n].bend));
-        if (most <= FINE * r || most >= SHRINKS * last) return;
-        last = most;
+        int ends = most <= FINE * r || most >= SHRINKS * last;
         for (int n = 0; n < count; n++) {
             double bend = bends(list + n, h);
-            list[n].need -= (bend - list[n].bend) / h;
+            if (!ends) list[n].need -= (bend - list[n].bend) / h;
             list[n].bend = bend;
         }
+        if (ends) return;
+        last = most;
     }
 }
 

@@ -109,6 +109,13 @@ double ask(Contact *c, double closed, double later, double least, double h) {
     return aim;
 }
 
+/* Correct what a contact asks for as at the end of the step before: where a disk rests in a wedge, corrections that begin
+   anew in each step would press it harder in each. */
+static void go_on_bending(Contact *c, const Contact *last, double h) {
+    c->bend = last->bend;
+    c->need -= c->bend / h;
+}
+
 /* Add a contact if the two touch and approach slowly, up to `bound`. With corners it is that at `place`, or continues the
    contact `still`, whose gap has changed by `change` since it was looked up. `least` is the smaller radius. Return 0 if
    there is no room. */
@@ -151,10 +158,7 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     /* Cohesion keeps a gap from opening; it never closes one. */
     double closed = MIN(c->gap, cohesion > 0 ? MAX(later, 0) : 0), aim = ask(c, closed, later, least, h);
     if (place && j < 0) {
-        if (last && last->turns > 0) {
-            c->bend = last->bend;
-            c->need -= c->bend / h;
-        }
+        if (last && last->turns > 0) go_on_bending(c, last, h);
         lean_first(c, h);
         relative(c, 0, u);
     }
@@ -202,6 +206,7 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
         c->drift = (until < h ? until : 0) * c->pull;
     } else if (gone) c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     else if (was_pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
+    if (last && !W.interact && !c->leaves && !gone) go_on_bending(c, last, h);
     if (j < 0 && W.interact && !cornered && !gone && !c->leaves) {
         follow(c, last ? W.length_before : 0, chord(c, aim - closed, h));
         if (c->turns > 0) c->need = closes(c, aim, h);

@@ -145,6 +145,7 @@ typedef struct {
     int joint;              /* set that it leaves as a whole, tangentially, or -1 */
     double free;            /* m; length of path on which it can meet only what it left, see `hop` */
     int hopped;             /* its latest round that was a hop */
+    int hit, hits;          /* surface of the latest event, and how many impacts on it were the latest ones */
     int idle, crawls;       /* consecutive events that took no time; that were slow, between two obstacles */
     double angle;           /* rad; of a ride round a circle ... */
     Bound bounds[2];        /* ... and its ends, backwards and forwards */
@@ -238,6 +239,7 @@ double polynomial(const double *c, int count, double t);
 int spans(const Obstacle *o, double x, double y);
 int is_reached(int circle, double x, double y, int epoch);
 int first_contact(const Motion *m, double *until, int *obstacle, int *side);
+int is_free(double way);
 double hop(const Motion *m, double until);
 void find_bounds(int circle, int side, double phi, int epoch, Bound *found);
 

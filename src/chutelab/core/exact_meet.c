@@ -398,6 +398,14 @@ static double clearance(double way) {
     return least - O.touch;
 }
 
+/* Whether a particle that hops on an obstacle can go so far without meeting anything else; then that length is used up. */
+int is_free(double way) {
+    if (way > A.free) A.free = clearance(way);
+    if (way > A.free) return 0;
+    A.free -= way;
+    return 1;
+}
+
 /* When a particle that an obstacle has thrown off is back on it, if it cannot meet anything else before that, and the hop is
    short; else infinite. The gap to a circle, over the time, is a straight line then, but for a small share. */
 double hop(const Motion *m, double until) {
@@ -419,11 +427,7 @@ double hop(const Motion *m, double until) {
             step = polynomial(gap, 4, t) / (gap[1] + t * (2.0 * gap[2] + t * 3.0 * gap[3]));
     }
     double way = t * (speed + 0.5 * t * length_of(m->ax, m->ay));
-    if (!(t > 0.0 && t < until)) return INFINITY;
-    if (way > A.free) A.free = clearance(way);
-    if (way > A.free) return INFINITY;
-    A.free -= way;
-    return t;
+    return t > 0.0 && t < until && is_free(way) ? t : INFINITY;
 }
 
 /* Whether a point that rides round a circle cannot meet something at a place: see `is_barred`. */

@@ -12,6 +12,7 @@ void write_knot_of(int inner) {
 void write_knot(void) { write_knot_of(0); }
 
 void record_event(int kind, int surface) {
+    A.hits = kind != IMPACT ? 0 : surface == A.hit ? A.hits + 1 : 1, A.hit = surface;
     double spin = A.turns ? A.z / A.given->radius : 0.0;
     E.events[E.event_count++] = (Event){ A.given->release + A.age, A.x, A.y, { A.vx, A.vy, spin },
                                          { A.vx, A.vy, spin }, 0.0, 0.0, E.lone, NONE, kind, surface };

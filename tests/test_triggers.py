@@ -46,6 +46,24 @@ def test_a_gate_opens_when_a_bell_is_struck():
     assert fallen == pytest.approx(0.5 * G * (times - STRUCK) ** 2, abs=2e-5)
 
 
+@pytest.mark.parametrize("moving", [0.0, 0.4])
+@pytest.mark.parametrize("ends", ["run", "gate"])
+def test_a_step_cut_short_before_the_end_or_a_gate_is_no_event_of_what_rests(ends, moving):
+    """The bell ends a step at 20 ms. Where a step ends next changes nothing for what lies still or
+    slides: it is not parted from its shelf, nor struck by it."""
+    gate = {"name": "gate", "from": [3.0, 0.0], "to": [4.0, 0.0], "restitution": 0.0}
+    late = {"name": "late", "from": [3.0, 1.0], "to": [4.0, 1.0], "restitution": 0.0}
+    for after in np.arange(0.05e-3, 2.1e-3, 0.05e-3):
+        until, gate["opens_at"] = (0.02 + after, 9.0) if ends == "run" else (0.03, 0.02 + after)
+        tables = scene(SHELF, gate, {**late, "opens_when": BELL}, until=until)
+        tables["stream"][0]["velocity"] = [moving, 0.0]
+        tables["stream"][1]["at"] = [1.0, 0.3 + R + 0.5 * G * 0.02**2]
+        recording = sound(chutelab.simulate(tables))
+        assert recording.triggered == pytest.approx([0.02])
+        own = recording.events[recording.events["particle"] == 0]
+        assert not {Kind.IMPACT, Kind.SEPARATION} & {*own["kind"]}, after
+
+
 def test_a_gate_shuts_when_a_bell_is_struck():
     """The second disk falls freely past where the lid is from then on, and the third does not."""
     lid = {"name": "lid", "from": [-1.0, 0.8], "to": [0.0, 0.8], "restitution": 0.0}

@@ -318,8 +318,11 @@ void close_step(double h) {
     for (EACH_LIVE(i)) {
         Disk *d = W.disks + i;
         Track *track = W.tracks + i;
+        /* If the step before was cut short, what rests is still on the hop that that step was solved for. */
+        int hops = d->hops && d->links >= 0 && W.step_end <= W.hopped + SOON * W.step;
         d->ends = -1;
         d->lies = d->supports > 0;
+        d->hops = d->lies || hops;
         d->whirl = d->lies ? MAX(d->whirl, whirl_of(d)) : 0;
         if (d->mode != FREE) {
             forget_loads(track);
@@ -327,11 +330,13 @@ void close_step(double h) {
         }
         settle_down(d, h);
         if (!d->supports) {
-            if (!is_tied(i) || square(d->vx) + square(d->vy) > square(CALM * W.pace)) d->calm = 0;
-            if (track->stays >= (W.interact ? LASTS : 3)) tell_separation(i);
-            if (track->lasted || track->stays) d->on = -1;
-            track->stays = 0;
-            forget_loads(track);
+            if (!hops) {
+                if (!is_tied(i) || square(d->vx) + square(d->vy) > square(CALM * W.pace)) d->calm = 0;
+                if (track->stays >= (W.interact ? LASTS : 3)) tell_separation(i);
+                if (track->lasted || track->stays) d->on = -1;
+                track->stays = 0;
+                forget_loads(track);
+            }
             flush_track(i);
             if (d->kick[0] != 0 || d->kick[1] != 0) {
                 knot_before(i, d->t, d->ux, d->uy, d->uspin);
@@ -394,6 +399,7 @@ void close_step(double h) {
         if (W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
         d->ends = reason;
     }
+    W.hopped = MAX(W.hopped, W.step_end);
     /* First take back what all of these are ahead, then change their states: impulses depend on both partners. */
     for (EACH_LIVE(i))
         if (W.disks[i].mode == FREE && W.disks[i].ends >= 0) take_back(i);

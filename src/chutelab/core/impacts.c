@@ -18,6 +18,7 @@ void hold(Disk *d, int k) {
 void was_moved(int i) {
     Disk *d = W.disks + i;
     d->impacts++;
+    d->hops = 0;
     d->calm = 0;
     d->stirred = 1;
     if (W.interact && d->impacts > STUCK) W.step_end = MIN(W.step_end, MAX(d->t, W.t + SHORTEST * W.step));

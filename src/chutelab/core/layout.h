@@ -122,6 +122,7 @@ typedef struct {
     int outline;            /* [in] ... and the first of them in `World.outlines` */
     int smooth;             /* number, from 1 on, of the step in which its hop was ended */
     int lies;               /* whether a lasting contact presses it in this step */
+    int hops;               /* whether it is on the hop that its last contacts gave it: no impact has moved it since */
     double whirl;           /* m/s2; if so, greatest centripetal acceleration of its corners at the beginning of the step,
                                and at which gaps to other particles close without impulses, else 0 */
     double inner, broad;    /* m; radius of the inner circle, and of a circle of its area; or its own */
@@ -525,6 +526,7 @@ typedef struct {
                             may make less overlap, and overlaps are removed more slowly */
     double usual;        /* s; the step unless something cuts it short; what a step corrects is for this length */
     double length, length_before; /* s; of this step and of the one before */
+    double hopped; /* s; latest time at which a step was to end when it was solved, and with it the hops of what rests */
     double again;        /* factor by which the impulses of the step before are the first guess for those of this one */
     double before;       /* share of this step's impulses that belongs to the one before */
     double g;            /* m/s2; size of gravity */

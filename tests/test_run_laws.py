@@ -166,6 +166,12 @@ def test_a_path_inside_an_arc_that_ends_short_of_the_disks_centre_is_bent_by_it(
     assert laws.judge(contact.run(build(chains.draw(seed)))) == ()
 
 
+def test_a_blow_that_is_left_to_a_solve_is_one_on_the_track():
+    """A cubic from the velocity before it, w dt into a wall, would be in the wall by 4/27 w dt."""
+    run = contact.run(build(chains.draw(2405)))
+    assert laws.judge(run) == ()
+
+
 @pytest.mark.parametrize(("side", "seen"), [(0.99, True), (1.01, False)])
 def test_a_disk_that_clips_an_end_between_knots_is_seen(side, seen):
     """It flies past the end of a wall at ever the same distance of 0.99 or 1.01 radii."""

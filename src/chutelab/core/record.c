@@ -154,6 +154,18 @@ void flush_track(int i) {
     track->lasted = 0;
 }
 
+/* Whether a disk by itself approached a surface, as its contact began, faster than a hop does: a blow that impacts have left
+   to the solve, as where it rattled in a wedge. */
+static int is_struck(const Disk *d) {
+    double u[3];
+    for (int link = d->links; link >= 0; link = W.links[link]) {
+        const Contact *c = W.contacts + link / 2;
+        relative(c, 1, u);
+        if (c->impulse[0] > 0 && -u[0] > W.soft) return 1;
+    }
+    return 0;
+}
+
 /* Note the state of a disk in lasting contact, after the impulses of a step.
 
    In contact a disk hops from step to step. Its smooth track goes through the states partway through the impulses of each
@@ -175,8 +187,8 @@ void track_lasting(int i) {
         state[4] *= longer;
     }
     for (int n = 0; n < 3; n++) entries[n] = d->entries[n] + d->gain[n] - d->ahead[n];
-    int lasted = track->lasted, is_blow = W.interact && !d->halved
-        && square(d->vx - d->ux) + square(d->vy - d->uy) > square(JOLT * d->inner / way);
+    int lasted = track->lasted, is_blow = W.interact ? !d->halved
+        && square(d->vx - d->ux) + square(d->vy - d->uy) > square(JOLT * d->inner / way) : !lasted && is_struck(d);
     if (!lasted || is_blow) knot_before(i, d->t, d->ux, d->uy, d->uspin);
     if (is_blow) {
         double after[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin}, given[3];

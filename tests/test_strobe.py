@@ -5,9 +5,10 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
-from chutelab import scene
+from chutelab import scene, start
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.plots import strobe
+from chutelab.pictures.plots.scenery import strobe_times
 from handmade import BELT_TIME, SHOWN, assert_legible, by_hand, expected
 
 
@@ -57,3 +58,12 @@ def test_still_is_sharp_enough_for_print(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["strobe.png"]
     with pytest.raises(FileNotFoundError):
         strobe(by_hand(), path=tmp_path / "nowhere" / "strobe.png")
+
+
+def test_a_run_that_ends_as_it_leaves_the_belt_has_as_many_dots_as_any():
+    """Ten for the action, which is over at once, or ten for a tenth of the track: 5,001 were."""
+    run = start("perpendicular")
+    run.step(0.3)
+    run.set("plate.angle_deg", 5.0)
+    run.step(0.2)
+    assert 10 <= len(strobe_times(run.recording)) <= 101

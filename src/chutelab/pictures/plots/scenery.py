@@ -94,11 +94,15 @@ def struck_by_nominal(recording: Recording) -> NDArray[Any]:
 
 
 def strobe_step(recording: Recording) -> float:
-    """Return the round time between strobe dots, s, chosen for the time until the last impact."""
+    """Return the round time between strobe dots, s, chosen for the time until the last impact.
+
+    It is chosen for a tenth of the track if that is longer: a run may end as the action begins.
+    """
     begin, end = action(recording)
+    clock = recording.track(0)["t"]
     struck = struck_by_nominal(recording)["t"]
     last = float(struck[-1]) if len(struck) and struck[-1] > begin else end
-    return round_step(max(last - begin, 1e-3), 10)
+    return round_step(max(last - begin, 0.1 * float(clock[-1] - clock[0]), 1e-3), 10)
 
 
 def strobe_times(recording: Recording) -> Floats:

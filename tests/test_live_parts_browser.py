@@ -14,7 +14,7 @@ from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
 from chutelab.scene import from_dict, load
 from chutelab.scene.look import JOINTS, MOTIONS
 from chutelab.util.words import words
-from live.browser import DONE, axe, spot
+from live.browser import DONE, Hand, axe, spot
 from shared import call
 
 expect = pytest.importorskip("playwright.sync_api").expect
@@ -699,6 +699,64 @@ def test_the_page_turns_to_the_other_language_as_it_is(shown):
     page.evaluate(DONE)
     assert page.locator("#energy summary").inner_text() == "Energy"
     assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 33.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("language", "said"),
+    [
+        ("en", "The trigger of door, flap is deleted, too"),
+        ("de", "Der Auslöser von door, flap ist mit gelöscht"),
+    ],
+)
+def test_a_trigger_that_is_deleted_with_what_it_waits_for_is_told(shown, language, said):
+    rows = "".join(
+        f"[[surface]]\nname = '{name}'\nfrom = [{x}, -1.0]\nto = [{x + 0.2}, -1.0]\n{more}\n"
+        for name, x, more in (
+            ("bell", 0.0, ""), ("door", 0.4, "opens_when = { touched = 'bell' }"),
+            ("flap", 0.8, "turn = 20.0\npivot = [0.8, -1.0]\nstarts_when = { touched = 'bell' }"),
+            ("gate", 1.2, "closes_when = { touched = 'door' }"),
+        )
+    )  # fmt: skip
+    page = shown(more=rows, language=language)
+    before, freed = given(page), page.locator("#freed")
+    page.evaluate("chutelab.bench.inspector.choose('bell')")
+    page.click("#part-delete")
+    expect(freed).to_contain_text(said)
+    left = given(page)["surface"]
+    assert [[key for key in one if key.endswith("_when")] for one in left] == [
+        [], [], ["closes_when"]
+    ]  # fmt: skip
+    page.click("#undo")
+    expect(freed).to_be_hidden()
+    assert given(page) == before
+    # What is deleted with the part that it waits for is not told.
+    page.evaluate("chutelab.bench.inspector.choose('door', 'gate')")
+    page.click("#part-delete")
+    assert len(given(page)["surface"]) == 2
+    expect(freed).to_be_hidden()
+
+
+@pytest.mark.slow
+def test_on_a_phone_the_turning_handle_of_a_wide_part_is_in_the_picture(shown):
+    """Beyond its ends is no room: the handle is before one, and turns the part as there."""
+    line = "[[surface]]\nname = 'line'\nfrom = [-1.5, -1.2]\nto = [3.0, -1.2]\n"
+    page = shown(more=line, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    page.evaluate("chutelab.bench.inspector.choose('line')")
+    box = page.locator("[data-id=turn-line] .room").bounding_box()
+    assert box["x"] >= 0.0
+    assert box["x"] + box["width"] <= 390.0
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    Hand(page, "touch").drag([(x, y), (x, y - 20.0), (x, y - 40.0)])
+    (_, low), (_, high) = given(page)["surface"][0]["points"]
+    assert high - low > 0.3
+    # In a wide picture it is beyond the end.
+    page = shown(more=line, viewport={"width": 1920, "height": 1080})
+    page.evaluate("chutelab.bench.inspector.choose('line')")
+    ((end, turn),) = page.evaluate(
+        "[chutelab.stage.handles.find(({ id }) => id === 'turn-line')].map((h) => [h.from[0], h.x])"
+    )
+    assert turn > end
 
 
 @pytest.mark.slow

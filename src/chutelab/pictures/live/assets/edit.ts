@@ -321,6 +321,13 @@ function endsOf({ surfaces, segments, arcs }: Machine, not: string[]): Point[] {
     Number(value.toPrecision(12))) as Point);
 }
 
+/** The names of what waits for a touch of one of some parts, and is none of them. */
+function waitingFor(given: Given, names: string[]): string[] {
+  return ["plate", "surface"].flatMap((table) => rowsOf(given, table)
+    .filter((row) => WAITS.some((key) => names.includes(row[key]?.touched)))
+    .map(({ name }) => name ?? table)).filter((name) => !names.includes(name));
+}
+
 /** A scene without some parts, by name; without particles there is no stream. */
 function without(given: Given, ...names: string[]): Given {
   const rest = { ...given };
@@ -383,6 +390,6 @@ const canGo = (given: Given, name: string) =>
   JSON.stringify(without(given, name)) !== JSON.stringify(given);
 
 export {
-  canGo, endsOf, motionOf, particlesAt, retied, rowsNamed, surfaceAt, withCopies, withJoint,
-  withMotion, withName, withPart, withRowOf, withTrigger, without,
+  canGo, endsOf, motionOf, particlesAt, retied, rowsNamed, surfaceAt, waitingFor, withCopies,
+  withJoint, withMotion, withName, withPart, withRowOf, withTrigger, without,
 };

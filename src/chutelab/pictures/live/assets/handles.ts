@@ -37,9 +37,11 @@ class Handles {
   list: Handle[] = [];
 
   /** @param lab the page's data
-   * @param away distance of a turning handle beyond its end, m */
+   * @param away distance of a turning handle beyond its end, m
+   * @param hasRoom whether the picture has room for a handle at a place, m */
   constructor(
     readonly scene: Scene, readonly machine: Machine, readonly lab: any, readonly away = 0,
+    readonly hasRoom = (_x: number, _y: number) => true,
   ) {
     this.belts();
     this.plates();
@@ -71,7 +73,8 @@ class Handles {
     this.list.push({ id, surface, what, shape, x: at[0], y: at[1], axes, drag, from, fixed });
   }
 
-  /** A handle beyond an end that turns everything about a point.
+  /** A handle beyond an end, or before it if the picture ends there, that turns everything about a
+   * point.
    * @param now degrees
    * @param values of the scene, for an angle */
   turning(
@@ -83,9 +86,12 @@ class Handles {
     const [ux, uy] = [(end[0] - cx) / far, (end[1] - cy) / far];
     const base = Math.atan2(uy, ux) / DEGREE;
     const bounds = this.axis(key, now, "degrees");
+    const ahead = ([1, -1] as const).map((side) => side * this.away);
+    const off = ahead.find((one) => far + one > this.away
+      && this.hasRoom(end[0] + one * ux, end[1] + one * uy)) ?? this.away;
     this.list.push({
       id: `turn-${surface}`, surface, what: "turn", shape: "turn", from: end,
-      x: end[0] + this.away * ux, y: end[1] + this.away * uy, axes: [bounds],
+      x: end[0] + off * ux, y: end[1] + off * uy, axes: [bounds],
       drag: (x, y) => {
         const turned = Math.atan2(y - cy, x - cx) / DEGREE - base;
         return [now + turned - 360 * Math.round(turned / 360)];

@@ -3,7 +3,7 @@
 import { roundUp } from "./chart.ts";
 import { MAIN, checked, fieldsOf, sectionsOf, showsFew, type Field, type Section } from "./controls.ts";
 import {
-  canGo, rowsNamed, withMotion, withName, withRowOf, without, type Part,
+  canGo, rowsNamed, waitingFor, withMotion, withName, withRowOf, without, type Part,
 } from "./edit.ts";
 import { listOf } from "./checks.ts";
 import { card, html, icon, iconButton, slide } from "./panels.ts";
@@ -290,9 +290,16 @@ class Inspector {
         button("close", "close", () => this.choose())), this.own.home);
     this.panel.hidden = true;
     home.before(this.panel);
-    lab.on("scene", () => this.refresh());
+    document.querySelector(".notes")?.append(this.freed);
+    lab.on("scene", () => {
+      this.freed.hidden = true;
+      this.refresh();
+    });
     this.refresh();
   }
+
+  /** Which triggers a deletion has taken along, until the scene changes again. */
+  freed = html("p", { id: "freed", role: "status", hidden: true });
 
   /** The name of the part chosen last; "scene" if none is. */
   get part() {
@@ -331,10 +338,16 @@ class Inspector {
   takeAway() {
     const { lab, parts } = this;
     if (!lab.given || !this.canDelete) return;
+    const freed = waitingFor(lab.given, parts);
     lab.asked = "";
     lab.replace(without(lab.given, ...parts));
     if (lab.fault) return;
     this.choose();
+    if (freed.length) {
+      this.freed.textContent = this.words.say("freed", {
+        names: freed.map((name) => this.words.name(name)).join(", ") });
+      this.freed.hidden = false;
+    }
     document.getElementById("picture")?.focus();
   }
 

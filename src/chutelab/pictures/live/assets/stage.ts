@@ -22,6 +22,9 @@ const MOST_TRACKS = 40;
 /** Distance from an end to the handle that turns it, px. */
 const BEYOND = 38;
 
+/** Radius of what a finger hits, px. */
+const FINGER = 22.5;
+
 /** An angle within NEARLY of a multiple of ROUND snaps to it, degrees. */
 const ROUND = 15, NEARLY = 1.5;
 
@@ -434,9 +437,13 @@ class Stage {
   placeHandles() {
     const { machine, scene } = this.lab;
     if (!machine || !scene) return;
-    const { data } = this.lab;
-    this.handles = this.show.handles
-      ? openHandles(new Handles(scene, machine, data, BEYOND / this.view.scale).list, data) : [];
+    const { lab: { data }, view } = this, { left, right, top, bottom } = view.free;
+    const isBetween = (value: number, low: number, high: number) =>
+      value > low + FINGER && value < high - FINGER;
+    const hasRoom = (x: number, y: number) =>
+      isBetween(view.px(x), left, right) && isBetween(view.py(y), top, bottom);
+    const all = () => new Handles(scene, machine, data, BEYOND / view.scale, hasRoom).list;
+    this.handles = this.show.handles ? openHandles(all(), data) : [];
     for (const more of this.further) this.handles.push(...more());
     const wanted = new Set(this.handles.map(({ id }) => id));
     for (const [id, grip] of this.gripOf) {

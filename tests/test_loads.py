@@ -67,6 +67,15 @@ def test_what_rests_in_a_wedge_that_locks_presses_no_harder_with_time(seed):
     assert lost.sum() == pytest.approx(brought + weight * (y[0] - y[-1]), rel=0.01)
 
 
+def test_a_wedge_takes_as_much_of_what_falls_into_it_in_a_quarter_of_the_step():
+    """Once both walls touch a disk, it leaves neither: the other one presses it there."""
+    lost = [
+        chutelab.simulate(tables(1159), {"run.dt": dt}, engine="contact").by_surface[:, 1:]
+        for dt in (1e-3, 0.25e-3)
+    ]
+    assert lost[0] == pytest.approx(lost[1], rel=0.01)
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_counting_loads_changes_no_bit_of_a_run(engine):
     with_, without = (

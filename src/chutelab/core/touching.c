@@ -301,6 +301,14 @@ static int stirs_sleeper(const Disk *a, const Disk *b) {
     return d->mode == FREE && square(x) + square(y) > square(0.5 * W.soft);
 }
 
+/* Whether a disk, whose contacts begin at `first`, would leave a surface on which another one presses it in this step. */
+static int is_wedged(int first) {
+    for (const Contact *c = W.contacts + first; c < W.contacts + W.contact_count; c++)
+        for (const Contact *o = W.contacts + first; o < W.contacts + W.contact_count && c->leaves; o++)
+            if (c->nx * o->nx + c->ny * o->ny < 0) return 1;
+    return 0;
+}
+
 /* List the contacts of the step and wake the sleepers among them. Return 0 if there is no room. */
 int find_contacts(double h, int *woke) {
     Places places;
@@ -346,6 +354,13 @@ int find_contacts(double h, int *woke) {
             if (has_corners(d)) most = MAX(most, left_over(d, d->impacts, k, d->radius, 0, W.t));
             if (has_corners(d)) list_places(i, -1 - k, h, &places);
             if (has_corners(d) ? !add_places(i, -1 - k, most, h, &places) : !add(i, -1 - k, d->radius, most, h, 0, 0, 0)) return 0;
+        }
+        if (d->supports == 1 && is_wedged(first)) {
+            /* Its contacts are listed again, as those of a disk that lies on two. */
+            d->supports = 2;
+            W.contact_count = first;
+            at_i--;
+            continue;
         }
         if (W.contact_count > first && !has_corners(d)) carry_to_end(i, first, h);
         for (Contact *c = W.contacts + first; W.interact && c < W.contacts + W.contact_count; c++) {

@@ -213,7 +213,7 @@ APART static void ride(void) {
         if (n == count) record_entries(c.surface, work, 0.0, heat);
         else A.entries[0] = before[0] + work, A.entries[2] = before[2] + heat;
         bear_round(c.surface, center_x, center_y, rho, A.given->radius);
-        write_knot_of(n < count || (end.outcome == NOTHING && A.age < stop));
+        write_knot_of((n < count || (end.outcome == NOTHING && A.age < stop)) + 2 * r->round);
         for (int k = 0; k < 3 && n < count; k++) A.entries[k] = before[k];
     }
     A.angle = end.phi;

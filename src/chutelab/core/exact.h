@@ -263,8 +263,8 @@ typedef struct {
 } Circle;
 
 /* The state at the end of a step, or at a knot within it, with time, work and heat since its beginning, and sin and cos
-   of the angle. */
-typedef struct { double dt, phi, up, across, w, z, work, heat, twist; int outcome; } Ridden;
+   of the angle; and whether a track of a family comes there round the circle in one direction. */
+typedef struct { double dt, phi, up, across, w, z, work, heat, twist; int outcome, round; } Ridden;
 
 #define MOST_KNOTS 32
 

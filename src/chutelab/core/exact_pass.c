@@ -26,7 +26,7 @@
 /* Knots from one whose sine and cosine are computed to the next: those between are turned on from the one before, each of
    which rounds once more. */
 #define FRESH 4
-/* Share of the longest h that the curve allows at the beginning: it may allow less later on. */
+/* Share of the longest h that is allowed at the beginning: it may be less later on. */
 #define FIRST 0.85
 
 static const Two PLACE[PAIRS] = {
@@ -58,7 +58,13 @@ static Place place_at(double phi, double up, double across, double rest) {
 /* Greatest second derivative of y near a place. */
 static double bend_at(const Place *p) { return wave + twice * twice * fabs(p->rest); }
 
-/* Whether y has no zero within an angle, at any complex angle. */
+/* The angle within which y has no zero, at any complex angle. */
+static double clear_of_zero(const Place *p) {
+    double slope = fabs(p->y[1]);
+    return 2.0 * p->y[0] / (slope + sqrt(slope * slope + 2.0 * bend_at(p) * p->y[0]));
+}
+
+/* Whether that is more than an angle. */
 static int is_clear_of_zero(const Place *p, double angle) {
     return p->y[0] > angle * (fabs(p->y[1]) + 0.5 * bend_at(p) * angle);
 }
@@ -91,8 +97,9 @@ int pass_round(const Circle *c, double longest, Ridden *end, Ridden *knots) {
     sin_cos(c->phi, &up, &across);
     Place now = place_at(c->phi, up, across, c->w * c->w - P * across - Q * up);
     double whole = fabs(last - c->phi), most = 384.0 * curve(), from = now.rest;
-    double h = FIRST * sqrt(sqrt(most * now.y[0] * now.y[0] / sqrt(bulge_at(&now))));
-    h = MIN(MIN(h, WIDEST), WIDEST / fabs(twice));
+    /* The tracks of a family are not kept, so its cubics need not be functions of time: see curve_after in hits.c. */
+    double h = E.brief ? clear_of_zero(&now) / CLEAR_OF : sqrt(sqrt(most * now.y[0] * now.y[0] / sqrt(bulge_at(&now))));
+    h = MIN(MIN(FIRST * h, WIDEST), WIDEST / fabs(twice));
     double steps = isfinite(whole) ? ceil(whole / h) : INFINITY;
     if (isfinite(whole)) h = whole / steps;
     double slope = wave + fabs(twice * from), before = g * now.across - sign_of(rho) * bend * now.y[0];
@@ -120,7 +127,7 @@ int pass_round(const Circle *c, double longest, Ridden *end, Ridden *knots) {
         slope = MAX(slope, wave + fabs(twice * then.rest));
         double least = before + after - (g + slope * bend) * h;
         if (!(least > 0.0 && then.y[0] > SLOW * wave && is_clear_of_zero(&then, CLEAR_OF * h))) break;
-        if (bulge_at(&then) > most * square(square(then.y[0]))) break;
+        if (!E.brief && bulge_at(&then) > most * square(square(then.y[0]))) break;
         if (!slips && isfinite(c->friction) && !(0.5 * c->friction * least > c->share * g)) break;
         if (!(MIN(fabs(now.y[0] - belt), fabs(then.y[0] - belt)) > slope * h)) break;
         double even = P * now.across + Q * now.up, odd = Q * now.across - P * now.up;
@@ -141,7 +148,7 @@ int pass_round(const Circle *c, double longest, Ridden *end, Ridden *knots) {
             heat = c->belt * work - load * ((rho * g - P) * (now.up - up) + Q * (now.across - across))
                 + 0.5 * (from - now.rest);
         knots[count++] = (Ridden){ t, now.phi, now.up, now.across, w, lever == 0.0 ? c->z : c->z - gain, work, heat,
-                                   0.0, NOTHING };
+                                   0.0, NOTHING, E.brief };
     }
     if (!count) return 0;
     *end = knots[count - 1];

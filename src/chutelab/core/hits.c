@@ -43,11 +43,23 @@ PAIRED static int apart(const Box *a, const double *piece, double margin) {
 
 /* Paths: cubics by their control points. */
 
+/* The sum of each of two pairs. */
+PAIRED static Two sums(Two a, Two b) {
+    return __builtin_shufflevector(a, b, 0, 2) + __builtin_shufflevector(a, b, 1, 3);
+}
+
+/* The path after a knot. Its cubic in time is what a recording has; where a family, of which only the ends are kept, goes
+   round a circle, it is the one nearest to the circle with the same directions at its ends. */
 PAIRED static Curve curve_after(const double *knot) {
     const double *next = knot + L.row;
-    double third = (next[0] - knot[0]) * (1.0 / 3);
-    Two from = two_at(knot + 1), to = two_at(next + 1);
-    return (Curve){{ from, from + third * two_at(knot + 3), to - third * two_at(next + 3), to }};
+    Two from = two_at(knot + 1), to = two_at(next + 1), v = two_at(knot + 3), w = two_at(next + 3), part;
+    if (L.owned && ((const Knot *)next)->inner >= 2) {
+        Two chord = to - from, squares = sums(v * v, w * w), others = sums(chord * chord, v * w);
+        double turned = sqrt(0.5 + 0.5 * others[1] / sqrt(squares[0] * squares[1]));
+        part = 2.0 / 3 / (1 + turned) * __builtin_elementwise_sqrt(both(others[0]) / squares);
+    } else
+        part = both((next[0] - knot[0]) * (1.0 / 3));
+    return (Curve){{ from, from + part[0] * v, to - part[1] * w, to }};
 }
 
 PAIRED static Two place_on(const Curve *c, double share) {
@@ -61,11 +73,6 @@ PAIRED void place_at(const double *knot, double share, double *x, double *y) {
     Two place = place_on(&c, share);
     *x = place[0];
     *y = place[1];
-}
-
-/* The sum of each of two pairs. */
-PAIRED static Two sums(Two a, Two b) {
-    return __builtin_shufflevector(a, b, 0, 2) + __builtin_shufflevector(a, b, 1, 3);
 }
 
 /* Bernstein coefficients of the square of the distance from a place, m2; the last of the seven is there twice. */

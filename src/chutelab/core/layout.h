@@ -381,7 +381,8 @@ typedef struct { float own[4], own_slide[4], others[4], others_slide[4], slips[4
 /* What they change of a body. */
 typedef struct { float x, y, rim, pad, swept[4], course[4]; } LightBody;
 
-/* inner: in the exact engine, whether it lies within a ride round a circle. */
+/* inner: in the exact engine, whether it lies within a ride round a circle; plus 2 if a track of a family comes there round
+   a circle from the knot before. */
 typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, inner; double angle; } Knot; /* [out] */
 
 typedef struct {                                                                         /* [out] */

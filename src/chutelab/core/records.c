@@ -168,7 +168,7 @@ static void keep_knots(const Exact *e, int first) {
         int has_come = reason == HAS_LANDED || reason == HAS_SETTLED;
         L.offsets[i] = Kept.knot_count;
         for (; k < end; k++) {
-            if (k > begin && k < end - 1 && (has_come || e->knots[k].inner)) continue;
+            if (k > begin && k < end - 1 && (has_come || e->knots[k].inner % 2)) continue;
             to = put(to, e->knots + k, KNOT_SIZE);
             Kept.knot_count++;
         }

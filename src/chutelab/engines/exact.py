@@ -269,7 +269,9 @@ def ended(module: Module, recorder: Recorder, stalled: StalledError | None) -> R
     exact: Any = module.structs["Exact"]
     if recorder.lent and exact.brief:
         labels = module.array("labels", INTEGER, 3 * len(record.events), of="Exact").reshape(-1, 3)
-        vars(record)["labels"] = labels[:, 1], labels[:, 2], labels[:, 0]
+        kinds = np.int64, np.int8, np.int16
+        particle, kind, surface = map(np.ndarray.astype, labels.T, kinds)
+        vars(record)["labels"] = kind, surface, particle
     return recorder.whole(record, stalled)
 
 

@@ -512,12 +512,15 @@ static void list_stops(int circle, int side, int epoch) {
 void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
     if (circle != O.stops_on || side != O.stops_side || epoch != O.stops_epoch || O.all[circle].rho != O.stops_rho)
         list_stops(circle, side, epoch);
+    double off = O.touch / fabs(O.all[circle].rho);
     for (int way = 0; way < 2; way++) found[way] = (Bound){ way ? INFINITY : -INFINITY, NONE, 0, 0, NONE };
     for (const Stop *s = O.stops; s < O.stops + O.stop_count; s++)
         for (int way = 0; way < 2; way++) {
             double sign = way ? 1.0 : -1.0;
             if (!(sign * s->closing > 0.0)) continue;
-            double ahead = MAX(modulo(sign * (s->what.angle - phi) + NOW, TURN) - NOW, 0.0);
+            /* In a tight hollow, or where the two hardly cross, the rounding of places is a larger angle. */
+            double now = MAX(NOW, MIN(off / fabs(s->closing), sqrt(2.0 * off)));
+            double ahead = MAX(modulo(sign * (s->what.angle - phi) + now, TURN) - now, 0.0);
             double place = phi + sign * ahead;
             if (!(sign * (place - found[way].angle) < 0.0)) continue;
             found[way] = s->what, found[way].angle = place;

@@ -280,7 +280,9 @@ def test_seconds_allowed_are_those_of_the_set_up_too(stream):
     stream = {"count": 2_000_000, "interact": True, **stream}
     made = scene.from_dict({"surface": [line], "stream": stream})
     began = process_time()
-    with pytest.raises(scene.SceneError, match=r"stream\.count = 2000000: fewer, or more seconds"):
+    with pytest.raises(
+        scene.SceneError, match=r"stream\.count = 2000000: must be fewer, or more seconds"
+    ):
         simulate(made, max_seconds=0.02)
     assert process_time() - began < 2.0
 

@@ -10,10 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-import wasmtime
 from hypothesis import settings
 
-from chutelab import core as module
 from live.browser import browser, idle, opened, page_of, shown  # noqa: F401
 
 ROOT = Path(__file__).parents[1]
@@ -71,6 +69,9 @@ collect_ignore_glob = ["solutions/*"]
 def with_fault(tmp_path, monkeypatch):
     """Return a function: from then on the core runs with a text in one of its files replaced."""
     pytest.importorskip("ziglang")
+    import wasmtime
+
+    from chutelab import core as module
 
     def plant(name, text, fault):
         core = tmp_path / "src" / "chutelab" / "core"

@@ -547,7 +547,7 @@ def drawn_piece(rng, name, angle):
 @pytest.mark.parametrize(
     ("engine", "crowded", "near", "count"),
     [("exact", False, 1e-9, 60), ("contact", False, 1e-9, 60), ("contact", True, 1e-9, 60),
-     ("pymunk", False, 1e-4, 60), ("pymunk", True, 1e-3, 24),
+     ("pymunk", False, 1e-4, 60), ("pymunk", True, 1e-3, 12),
      pytest.param("pymunk", True, 1e-3, 60, marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_round_an_end_a_belt_runs_as_if_no_gate_had_been_there(engine, crowded, near, count):

@@ -292,18 +292,23 @@ def test_each_shipped_scene_says_what_it_shows_and_by_what_source(name):
 SECONDS_IN_PYMUNK = (
     *("bucket-elevator", "coal-transfer", "cradle", "damper-plate", "domino-gate", "dominoes"),
     *("drum", "feeder", "flap-gate", "galton", "heap", "hopper", "loop", "rock-box", "silo"),
-    *("slip", "stream", "vibrating-feeder"),
+    *("belt-landing", "mixture", "slip", "spoon", "stream", "vibrating-feeder"),
 )
-"""Scenes that take Pymunk 1.5 s or more: with it they are verified in the slow tests."""
+"""Scenes that take Pymunk 0.5 s or more: with it they are verified in the slow tests."""
+
+
+SECONDS = ("feeder", "galton", "heap")
+"""Of these those that take the contact engine over a second, too."""
 
 
 @pytest.mark.parametrize(
     ("name", "engines"),
     [
-        *((name, 2 if name in SECONDS_IN_PYMUNK else 3) for name in sc.shipped()),
+        *((name, 2 if name in SECONDS_IN_PYMUNK else 3)
+          for name in sc.shipped() if name not in SECONDS),
         *(pytest.param(name, 3, marks=pytest.mark.slow) for name in SECONDS_IN_PYMUNK),
     ],
-)
+)  # fmt: skip
 def test_each_shipped_scene_shows_what_it_is_expected_to(name, engines, monkeypatch):
     def some(scene, engine, **options):
         if engine not in ("dop853", *ENGINES[:engines]):

@@ -69,6 +69,7 @@ def test_tape_and_tracer_with_the_keyboard_alone(shown):
     assert v == pytest.approx(np.hypot(2.0, 9.81 * fall), abs=6e-4)
 
 
+@pytest.mark.slow
 def test_tape_and_tracer_with_a_pointer(shown):
     page = shown("perpendicular")
     page.click("#tool-tape")

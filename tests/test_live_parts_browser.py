@@ -133,6 +133,7 @@ def test_each_part_is_drawn_saved_and_runs_to_the_same_bits(empty, tmp_path):
         page.evaluate(DONE)
 
 
+@pytest.mark.slow
 def test_everything_that_a_part_can_say_has_a_field_and_is_saved(empty, tmp_path):
     """All keys of each part but those that contradict what it is, from the tables of rules."""
     page = empty()
@@ -478,6 +479,7 @@ def test_after_its_end_a_run_takes_a_ball_and_escape_takes_a_refusal_away(shown)
     expect(page.locator("#fault")).to_be_hidden()
 
 
+@pytest.mark.slow
 def test_a_hinge_is_pushed_in_a_running_run_by_hand_and_by_keys_as_python_does(shown):
     """Work and heat of a flap with a ball on it are in the ledger, in the bits of Python's run."""
     flap = {"name": "flap", "from": [0.0, 0.0], "to": [0.4, 0.0], "hinge": [0.0, 0.0],
@@ -684,6 +686,7 @@ def test_a_link_and_html_to_embed_open_the_machine_as_it_is(shown, opened, tmp_p
     assert within.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 33.0
 
 
+@pytest.mark.slow
 def test_the_page_turns_to_the_other_language_as_it_is(shown):
     page = shown("inclined-40", viewport={"width": 1366, "height": 768})
     page.evaluate("chutelab.lab.change({ 'plate.angle_deg': 33 })")
@@ -880,6 +883,7 @@ def test_the_first_machine_and_the_examples_are_one_click_away(empty):
     assert page.inner_text("h1") == words("de").say("title-cascade")
 
 
+@pytest.mark.slow
 def test_dominoes_run_whole_and_a_box_is_made_turned_caught_and_saved(shown, tmp_path):
     page = shown("dominoes")
     expect(page.locator("#lacks")).to_have_count(0)

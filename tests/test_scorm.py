@@ -239,6 +239,7 @@ def interactions(data):
     return [found[key] for key in sorted(found, key=int)] if isinstance(found, dict) else found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LESSONS)
 def test_a_lesson_is_left_resumed_and_completed_in_a_platform(platform, name):
     platform.start(name)

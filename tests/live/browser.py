@@ -1,15 +1,13 @@
-"""Pages in a real browser: none of them says anything on the console, or asks for anything."""
+"""Pages in a real browser: none of them says anything on the console, or asks for anything.
+
+Chutelab is imported where it is used: the process that only hands out tests loads this, too.
+"""
 
 import shutil
 from collections import defaultdict
 from pathlib import Path
 
 import pytest
-
-from chutelab.classroom.lessons.pages import live_page
-from chutelab.pictures.live import html
-from chutelab.scene import load, parse, to_toml
-from shared import find
 
 # A page without `eval` cannot be waited for by a condition; a run is shown some frames after it is
 # there, or is as far as it may go.
@@ -263,6 +261,8 @@ def opened(browser, idle):
 @pytest.fixture
 def shown(opened, tmp_path):
     """Open the live page of a scene, with `more` after its file's end, and wait for the run."""
+    from chutelab.pictures.live import html
+    from chutelab.scene import load, parse, to_toml
 
     def show(name="perpendicular", overrides=(), *, more="", language="en", **options):
         path = tmp_path / "page.html"
@@ -278,6 +278,8 @@ def shown(opened, tmp_path):
 @pytest.fixture
 def page_of(opened, tmp_path):
     """Open the live page of a lesson."""
+    from chutelab.classroom.lessons.pages import live_page
+    from shared import find
 
     def open_(name, language="en", size=(1366, 768), **options):
         path = tmp_path / f"{name}-{language}.html"

@@ -29,7 +29,7 @@ from pymunk import Vec2d, batch
 from chutelab.engines.pymunk.faces import Bend, Flight, no_rims
 from chutelab.engines.pymunk.moving import Moving, Rolling, Ties
 from chutelab.engines.pymunk.shapes import Shapes
-from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Carriage, World
+from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Carriage, World, balance
 from chutelab.machine import SWING, VISCOSITY, Machine
 from chutelab.results.loads import Bins
 from chutelab.results.recorder import EnoughError, Recorder, Tracks
@@ -411,6 +411,8 @@ class Shared:
         pair = other < self.count
         if self.machine.triggers:
             self._touched({*self.surface[other[~pair]].tolist()})
+        if (sums[1:3] < 0.0).any():
+            balance(sums[1:3], one, np.where(pair, other, one), self.count)
         self.recorder.by_surface[-1] += sums[:3] @ pair
         for k in np.flatnonzero(pair) if self.rides else ():
             for row, motion, sign in ((one, mine, -0.5), (other, others, 0.5)):

@@ -28,7 +28,7 @@ from chutelab.engines.pymunk.faces import (
 from chutelab.machine import Arcs, Machine, Segments
 from chutelab.results.loads import Bins
 from chutelab.results.recorder import Recorder
-from chutelab.util.arrays import Floats, bisected
+from chutelab.util.arrays import Floats, Ints, bisected
 
 PARTICLE, SURFACE = 1, 2
 """Collision types of disks and of everything they meet."""
@@ -434,3 +434,39 @@ class Carriage:
         bins.bear(
             surfaces, times[:-1], times[1:], *self.foot(times[:-1] + 0.5 * span), (y, weight - x)
         )
+
+
+def balance(losses: Floats, one: Ints, other: Ints, count: int) -> None:
+    """Change losses of contacts, (2, k), of which only the sum of each island is meaningful.
+
+    Contacts that are solved together may seem to give energy that others take: within an island of
+    particles that touch each other, negative losses are set against positive ones, in proportion,
+    first those along the normal and those along the surface for themselves.
+
+    Parameters
+    ----------
+    one, other
+        The particles of each contact; the same one twice at a surface.
+    count
+        How many particles there are.
+    """
+    island, before = np.arange(count), None
+    mine, others = one[one != other], other[one != other]
+    while before is None or (island != before).any():
+        before = island.copy()
+        least = np.minimum(island[mine], island[others])
+        np.minimum.at(island, island[mine], least)
+        np.minimum.at(island, island[others], least)
+        island = island[island]
+    of = island[one]
+    for rows in (slice(0, 1), slice(1, 2), slice(0, 2)):
+        some = losses[rows]
+        less = np.minimum(some, 0.0)
+        if not less.any():
+            continue
+        more = some - less
+        plus, minus = (np.bincount(of, part.sum(axis=0), count) for part in (more, less))
+        left = plus + minus
+        up = np.divide(np.maximum(left, 0.0), plus, out=np.zeros(count), where=plus > 0.0)
+        down = np.divide(np.minimum(left, 0.0), minus, out=np.zeros(count), where=minus < 0.0)
+        losses[rows] = more * up[of] + less * down[of]

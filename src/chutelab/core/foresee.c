@@ -123,6 +123,7 @@ double left_by_corners(int i, int j, double gap, double t) {
     double small = MIN(a->inner, b->inner), back = 1.000001 * (W.g + MAX(a->whirl, b->whirl)) * W.step;
     if (!are_few(W.contact_count) && (a->supports || b->supports))
         back = left_late(a, b, small, gap, MAX(back, LATEST * W.soft), t);
+    else if (t < W.step_end) back = MIN(back, LATE * small / (W.step_end - t));
     double least = MAX(MAX(soft_approach(a, small), back), MAX(a->open, b->open));
     if (a->halved || b->halved) least = MAX(least, LEFT_BY_TURNS * W.pace);
     return grown(least, MAX(a->impacts, b->impacts), MANY, W.skip * small);

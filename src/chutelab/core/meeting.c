@@ -202,7 +202,7 @@ static double rolls_at(int i, int j, double low, double high, double soft) {
    is the bound of `fastest_of`. Two particles may be left to the next step up to a faster approach, see `left_by_corners`. */
 double meet_corners(int i, int j, double from, double until, double most, double soft) {
     double span = until - from, small = inner_of(i, j), near = TOUCH * small;
-    double h = 0, first = INFINITY, gap[CANDIDATES];
+    double h = 0, first = INFINITY, gap[CANDIDATES], closes;
     int sides[MOST_CORNERS], in_reach[CANDIDATES], many = 0, closed, clear;
     if (!(span > 0) || most <= soft) return INFINITY;
     Shape a = shape_of(i, from), b = shape_of(j, from);
@@ -226,19 +226,19 @@ double meet_corners(int i, int j, double from, double until, double most, double
         gap[c] = gap_at(&a, &b, near, &now);
         closed |= gap[c] <= 0;
         if (gap[c] > most * span) continue;
-        /* A closed gap to another polygon closes no faster than is left to the next step; on a surface it may, since
-           surfaces may turn. */
-        if (!both || (gap[c] > 0 && least_gap(i, j, &a, &b, from, span, bends, &now) <= 0)) in_reach[many++] = c;
+        /* A closed gap to another polygon closes faster than is left to the next step only if rotation makes it. */
+        if (!both || (gap[c] > 0 ? least_gap(i, j, &a, &b, from, span, bends, &now) <= 0 : bends * span > soft))
+            in_reach[many++] = c;
     }
     if (closed && (!both || may_close(i, j, &a, &b, from, soft)) && closes_faster(i, j, &a, &b, from, 0, soft)) return from;
     while (h < span && first == INFINITY && many) {
         double least = INFINITY, last = from + h;
         for (int n = 0; n < many; n++) {
             if (gap[in_reach[n]] > 0) least = MIN(least, gap[in_reach[n]]);
-            else if (rolls && in_reach[n] == a.count + b.round) least = 0;
+            else if (both || (rolls && in_reach[n] == a.count + b.round)) least = 0;
         }
         h = MIN(h + MAX(least / most, least_stride), span);
-        double t = h < span ? from + h : until, closes;
+        double t = h < span ? from + h : until;
         Shape a2, b2;
         if (!both) a2 = shape_of(i, t), b2 = shape_of(j, t);
         for (int n = 0; n < many; n++) {
@@ -252,6 +252,9 @@ double meet_corners(int i, int j, double from, double until, double most, double
             if (before <= 0 && gap[c] < before && b.round >= 0 && c - a.count == b.round
                 && closes_faster(i, j, &a2, &b2, t, TOUCHING * small, soft))
                 first = MIN(first, rolls_at(i, j, last, t, soft));
+            /* It closes fast enough at the end of the stride, which is soon enough. */
+            if (both && before <= 0 && gap[c] < before && closes > soft && closes > left_by_corners(i, j, gap[c], t))
+                first = MIN(first, t);
             if (!(before > 0 && gap[c] <= 0)) continue;
             double then = both ? corner_root(i, j, c, last, t, before, gap[c], most)
                                : root_of(i, j, &now, last, t, before, gap[c], most);

@@ -297,7 +297,7 @@ SECONDS_IN_PYMUNK = (
 """Scenes that take Pymunk 0.5 s or more: with it they are verified in the slow tests."""
 
 
-SECONDS = ("feeder", "galton", "heap")
+SECONDS = ("feeder", "galton", "heap", "mixture")
 """Of these those that take the contact engine over a second, too."""
 
 

@@ -6,10 +6,13 @@
 /* With this restitution, JAM impacts halve the normal velocity; with a larger one they don't jam a disk. */
 #define LASTING 0.9914
 
-/* Note that a disk lies on a surface. */
+/* Note that a disk lies on a surface. One that it left as this step began, and meets again, is listed already. */
 void hold(Disk *d, int k) {
-    for (int n = 0; n < d->held_count; n++)
-        if (d->held[n] == k) return;
+    for (int n = 0; n < d->held_count; n++) {
+        if (d->held[n] != k) continue;
+        d->supports = MAX(d->supports, 1);
+        return;
+    }
     if (d->held_count < MAX_HELD) d->held[d->held_count++] = k;
     d->supports++;
 }

@@ -206,7 +206,7 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
         c->drift = (until < h ? until : 0) * c->pull;
     } else if (gone) c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     else if (was_pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
-    if (last && !W.interact && !c->leaves && !gone) go_on_bending(c, last, h);
+    if (last && !W.interact && !alone && !c->leaves) go_on_bending(c, last, h);
     if (j < 0 && W.interact && !cornered && !gone && !c->leaves) {
         follow(c, last ? W.length_before : 0, chord(c, aim - closed, h));
         if (c->turns > 0) c->need = closes(c, aim, h);

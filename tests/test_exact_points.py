@@ -44,6 +44,10 @@ RIMS = [146, 270]
 """Chains on which a point falls back vertically, onto the very rim of the bowl that it left,
 from wherever it starts; the edge of another piece, which a disk in the bowl passes, strikes it."""
 
+GAP = 2872
+"""A chain whose ends are 0.18 µm apart, by the rounding of its numbers: a point falls between them,
+disks of 0.1 µm and more rest on both."""
+
 
 def off_the_limit(seeds):
     """Return where a point goes another way than a disk of 0.1 µm, and the share decided."""
@@ -62,7 +66,7 @@ def test_a_point_is_the_limit_of_small_disks():
 @pytest.mark.slow
 def test_a_point_is_the_limit_of_small_disks_on_thousands():
     off, decided = off_the_limit(range(3000))
-    assert off == RIMS
+    assert off == [*RIMS, GAP]
     assert decided > 0.8
 
 

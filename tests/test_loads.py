@@ -76,6 +76,27 @@ def test_a_wedge_takes_as_much_of_what_falls_into_it_in_a_quarter_of_the_step():
     assert lost[0] == pytest.approx(lost[1], rel=0.01)
 
 
+def test_a_disk_close_to_an_end_falls_freely():
+    """It rolls up on one end of a slot, 1.4 µm away from the other, and back. In the slot, where it
+    touches neither end, the second difference of its places is that of a free fall."""
+    drawn = tables(726)
+    (arc,) = drawn["surface"]
+    angles = np.radians([arc["from_deg"], arc["to_deg"]])
+    ends = arc["radius"] * np.column_stack([np.cos(angles), np.sin(angles)])
+    run = chutelab.simulate(drawn, {"run.dt": 1e-3 / 64}, engine="contact")
+    tau = 1e-5
+    times = np.arange(0.1, 0.2, tau)
+    places = run.at(times)[0][:, 0]
+    gaps = np.linalg.norm(places[:, None] - ends, axis=2) - drawn["particle"]["radius"]
+    at = np.degrees(np.arctan2(places[:, 1], places[:, 0])) % 360.0
+    in_slot = (arc["to_deg"] - 360.0 < at) & (at < arc["from_deg"])
+    clear = in_slot & (gaps.min(axis=1) > 5e-8)
+    apart = clear[:-2] & clear[1:-1] & clear[2:]
+    pulled = (places[2:] - 2.0 * places[1:-1] + places[:-2])[apart] / tau**2
+    assert len(pulled) > 10
+    assert pulled == pytest.approx(np.tile([0.0, -G], (len(pulled), 1)), abs=1e-6)
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_counting_loads_changes_no_bit_of_a_run(engine):
     with_, without = (

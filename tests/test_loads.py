@@ -76,6 +76,17 @@ def test_a_wedge_takes_as_much_of_what_falls_into_it_in_a_quarter_of_the_step():
     assert lost[0] == pytest.approx(lost[1], rel=0.01)
 
 
+def test_what_a_disk_in_a_hollow_never_touches_takes_nothing_from_it():
+    """The outside of p4 goes on from the other side of a hollow 56 µm wider than the disk."""
+    drawn = tables(559)
+    run = chutelab.simulate(drawn, engine="contact")
+    (p4,) = (row for row in drawn["surface"] if row["name"] == "p4")
+    away = np.linalg.norm(run.knots["position"] - p4["center"], axis=1)
+    assert (away - p4["radius"] - drawn["particle"]["radius"]).min() > 0.0
+    lost = dict(zip(run.surfaces, run.by_surface[:, 1:], strict=False))
+    assert lost["p4"].tolist() == [0.0, 0.0]
+
+
 def test_a_disk_close_to_an_end_falls_freely():
     """It rolls up on one end of a slot, 1.4 µm away from the other, and back. In the slot, where it
     touches neither end, the second difference of its places is that of a free fall."""

@@ -17,6 +17,8 @@
 #define GIVES 3e-3
 /* Gap, in radii, up to which a contact that was pressed still touches: sweeps leave gaps so wide. */
 #define LEAVE 1e-4
+/* Cosine of the angle within which a contact goes over from a face to the next one in a step. */
+#define ALIKE 0.5
 
 /* The gap at the end of the step on the path without impulses; for a surface also the curvature of the path along it, see
    `bending`, if `bends` is not null. */
@@ -27,8 +29,14 @@ double gap_later(const Contact *c, double h, double *bends) {
         const Surface *s = surface_at(-1 - c->j, a->t + h), *then = face_at(s, x, y);
         /* From a distance a disk can only come to the piece that the normal belongs to. */
         if (then != s && c->gap > TOUCH * a->radius) return INFINITY;
+        double gap = gap_to(then, x, y, a->radius, &nx, &ny);
+        /* In a hollow hardly wider than the disk what follows may be nearest on the other side. */
+        if (then != s && nx * c->nx + ny * c->ny < ALIKE) {
+            then = s;
+            gap = gap_to(then, x, y, a->radius, &nx, &ny);
+        }
         if (bends) *bends = bending(then, x, y, a->radius);
-        return gap_to(then, x, y, a->radius, &nx, &ny);
+        return gap;
     }
     const Disk *b = W.disks + c->j;
     x -= b->x + (b->vx + 0.5 * W.gx * h) * h;
@@ -83,7 +91,7 @@ static double closes(const Contact *c, double aim, double h) {
         double y = d->y + (d->vy + need * c->ny + 0.5 * W.gy * h) * h;
         double gap = gap_to(face_at(surface_at(-1 - c->j, d->t + h), x, y), x, y, d->radius, &nx, &ny);
         double slope = nx * c->nx + ny * c->ny;
-        if (slope < 0.5) break;
+        if (slope < ALIKE) break;
         need += (aim - gap) / (slope * h);
     }
     return need;

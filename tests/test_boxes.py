@@ -717,6 +717,39 @@ def test_what_slides_along_a_face_that_spins_does_not_get_into_it(at, velocities
     assert min(gaps) > -2e-3 * 0.5 * side
 
 
+@pytest.mark.parametrize("e", [0.0, 0.3])
+@pytest.mark.parametrize("gap", [0.002, 0.01])
+@pytest.mark.parametrize("omega", [5.0, 20.0])
+def test_a_tip_that_comes_on_a_tip_while_others_touch_passes_nothing(omega, gap, e):
+    """Two like triangles, base on base, of which one turns about a tip until the bases meet.
+
+    At the other end no corner is inside anything then, and by separating axes both overlap.
+    """
+    side = 0.016
+    high = 0.5 * side * sqrt(3.0)
+    triangle = np.array([(-0.5 * side, -high / 3.0), (0.5 * side, -high / 3.0), (0.0, high / 1.5)])
+    tip = np.array([-0.5 * side, 0.0])
+    arm = np.array(turned([(0.5 * side, high / 3.0)], gap)[0])
+    row = {"interact": True, "restitution": e, "friction": 0.3}
+    recording = run({
+        "gravity": 0.0,
+        "particle": {"shape": "polygon", "points": triangle.tolist(), "mass": 0.05, "spin": True},
+        "surface": [{"name": "far", "from": [-5.0, -5.0], "to": [5.0, -5.0]}],
+        "stream": [
+            {"at": [0.0, -high / 3.0], "velocity": [0.0, 0.0], "angle_deg": 180.0, **row},
+            {"at": (tip + arm + [0.0, 1e-9]).tolist(), "angle_deg": degrees(gap), "omega": -omega,
+             "velocity": [omega * arm[1], -omega * arm[0]], **row},
+        ],
+        "run": {"until": 0.02},
+    })  # fmt: skip
+    now = recording.at(np.linspace(0.0, 0.02, 201))
+    gaps = [
+        apart(*(place + turned(triangle, by) for place, by in zip(places, turns, strict=True)))
+        for places, turns in zip(now.position, now.angle, strict=True)
+    ]
+    assert min(gaps) > -1e-3 * high / 3.0
+
+
 def streamed(seed):
     """Return a scene: a stream of boxes or pentagons, all alike, falls in one place of a bin."""
     random = np.random.default_rng(seed)

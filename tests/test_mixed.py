@@ -596,3 +596,55 @@ def test_what_slides_along_a_turning_box_stays_on_it():
     rough, fine = np.array(errors)
     assert (rough < [3e-5, 1e-4]).all()
     assert (fine < 0.3 * rough).all()
+
+
+def streamed(seed):
+    """Return a scene: streams of disks, boxes and polygons fall into a bin, on what is in it."""
+    random = np.random.default_rng(seed)
+
+    def one(*values):
+        return values[int(random.integers(len(values)))]
+
+    contact = {"friction": one(0.0, 0.3, 0.8), "restitution": one(0.0, 0.2, 0.6, 0.9)}
+    kinds, streams = [], []
+    for k in range(int(random.integers(1, 4))):
+        r, turns = (
+            random.uniform(0.004, 0.015),
+            2.0 * np.pi * np.arange(n := random.integers(3, 8)) / n,
+        )
+        outline = (r * np.stack([np.cos(turns), np.sin(turns)])).T.tolist()
+        shape = one({"radius": r}, {"radius": [0.7 * r, 1.3 * r]},
+                    {"shape": "box", "size": [2.0 * r, 2.0 * r]},
+                    {"shape": "box", "size": [2.0 * r, 0.5 * r]},
+                    {"shape": "polygon", "points": outline})  # fmt: skip
+        kinds.append({"name": f"kind {k}", "mass": one(0.01, 0.05), "spin": True, **shape})
+        turned = {"omega": one(0.0, 5.0, -40.0), "angle_deg": one(0.0, 0.0, 45.0, 20.0)}
+        streams.append({
+            "particle": f"kind {k}", "count": one(15, 30, 60), "rate": one(20.0, 60.0, 120.0),
+            "at": [random.uniform(-0.08, 0.08), random.uniform(0.4, 0.8)],
+            "velocity": [one(0.0, 0.0, 0.5, -0.5), one(0.0, -1.0)], "start": one(0.0, 0.0, 0.3),
+            "interact": True, **contact, **(turned if "shape" in shape else {}),
+        })  # fmt: skip
+    wide = one(0.1, 0.2, 0.3)
+    walls = [[-wide, 1.5], [-wide, 0.0], [wide, 0.0], [wide, 1.5]]
+    surfaces = [{"name": "bin", "points": walls, **contact}]
+    for k in range(int(random.integers(3))):
+        at = np.array([random.uniform(-0.12, 0.12), random.uniform(0.1, 0.35)])
+        half, angle = one(0.03, 0.08), random.uniform(-0.8, 0.8)
+        arm = half * np.array([np.cos(angle), np.sin(angle)])
+        board = {"from": (at - arm).tolist(), "to": (at + arm).tolist()}
+        surfaces.append({"name": f"board {k}", **contact, **one(
+            board, {**board, "speed": one(0.5, -1.0)},
+            {**board, "hinge": at.tolist(), "mass": 0.3, "spring": one(0.0, 0.5), "damper": 0.002},
+            {**board, "turn": one(90.0, -300.0), "pivot": at.tolist()},
+            {**board, "shake": {"by": [0.0, 0.004], "frequency": 20.0}},
+            {"center": at.tolist(), "radius": 0.6 * half, "from_deg": -180.0, "to_deg": 180.0},
+            {"center": at.tolist(), "radius": half, "from_deg": -180.0, "to_deg": 0.0},
+        )})  # fmt: skip
+    return {"particle": kinds, "stream": streams, "surface": surfaces, "run": {"until": 1.5}}
+
+
+@pytest.mark.parametrize("seed", seeds(2, 100))
+def test_streams_of_several_shapes_keep_the_laws(seed):
+    """None gets into another, nor through a surface, and the ledger closes."""
+    sound(chutelab.simulate(streamed(seed), engine="contact"))

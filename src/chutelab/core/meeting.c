@@ -65,18 +65,10 @@ static double gap_at(const Shape *a, const Shape *b, double near, Touch *at) {
     return at->gap;
 }
 
-/* Lower bound, m, of the gap that a corner of one polygon has to the other within a span, from its gap and speed at an
-   edge at t. The rotation of both accelerates it by at most `bends`, m/s2. */
-static double least_gap(int i, int j, const Shape *a, const Shape *b, double t, double span, double bends, Touch *at) {
-    double off;
-    at->on = at->which < a->count ? furthest(b, a->p[at->which], &off) : furthest(a, b->p[at->which - a->count], &off);
-    fill_in(a, b, at);
-    return at->gap - (closes_at(i, j, a, b, t, at) + 0.5 * bends * span) * span;
-}
-
 /* The gap of a corner of polygon i outside of polygon j at t, m, and the speed at which it closes. This is `gap_at` without
-   whole shapes, in the frame of j. */
-static double corner_gap(int i, int corner, int j, double t, double *closes) {
+   whole shapes, in the frame of j. `on` has a bit for the edge that the corner is furthest outside of, and for others of
+   which it is outside by hardly less: then it is at a tip. */
+static double corner_gap(int i, int corner, int j, double t, double near, double *closes, int *on) {
     const Disk *d = W.disks + i, *o = W.disks + j;
     const double *at = W.outlines + 2 * (d->outline + corner), *point = W.outlines + 2 * o->outline;
     const double *edge = W.edges + 3 * o->outline, *best = edge;
@@ -92,17 +84,19 @@ static double corner_gap(int i, int corner, int j, double t, double *closes) {
     double along = other[0] * x + other[1] * y, across = other[0] * y - other[1] * x;
     for (int n = 0; n < o->corners; n++, point += 2, edge += 3) {
         double off = (along - point[0]) * edge[0] + (across - point[1]) * edge[1];
-        if (off <= gap) continue;
-        gap = off;
-        best = edge;
+        if (off > gap) {
+            *on = (off - gap <= near ? *on : 0) | 1 << n;
+            gap = off;
+            best = edge;
+        } else if (gap - off <= near) *on |= 1 << n;
     }
     *closes = -(best[0] * (other[0] * u + other[1] * v) + best[1] * (other[0] * v - other[1] * u));
     return gap;
 }
 
 /* The same for a candidate of two polygons; `count` is the number of corners of the first one. */
-static double candidate_gap(int i, int j, int count, int which, double t, double *closes) {
-    return which < count ? corner_gap(i, which, j, t, closes) : corner_gap(j, which - count, i, t, closes);
+static double candidate_gap(int i, int j, int count, int which, double t, double near, double *closes, int *on) {
+    return which < count ? corner_gap(i, which, j, t, near, closes, on) : corner_gap(j, which - count, i, t, near, closes, on);
 }
 
 /* The instant within (low, high] at which the gap of a corner of a polygon to another one closes, from `above` 0 to `below`,
@@ -110,11 +104,12 @@ static double candidate_gap(int i, int j, int count, int which, double t, double
    the way from one to the other at a speed of `most` is as small as the rounding of a place. */
 static double corner_root(int i, int j, int which, double low, double high, double above, double below, double most) {
     double rounding = EPS * (fabs(W.disks[i].x) + fabs(W.disks[i].y)), more = MAX(0.25 * rounding / most, EPS * high), closes;
+    int on;
     double t = high + (high - low) * below / (above - below);
     for (int n = 0; n < TO_ROOT && (high - low) * most > rounding; n++) {
         if (n >= QUICK || !(t > low && t < high)) t = 0.5 * (low + high);
         if (!(t > low && t < high)) break;
-        double gap = candidate_gap(i, j, W.disks[i].corners, which, t, &closes);
+        double gap = candidate_gap(i, j, W.disks[i].corners, which, t, 0, &closes, &on);
         if (gap > 0) low = t;
         else high = t;
         t += gap / closes + (gap > 0 ? more : -more);
@@ -186,9 +181,9 @@ static int may_close(int i, int j, const Shape *a, const Shape *b, double t, dou
     return 0;
 }
 
-/* The instant within (low, high] from which on a touching place closes faster than `soft`, for a particle that rolls from
-   a corner onto an edge round a disk or an arc: it touches all the time. */
-static double rolls_at(int i, int j, double low, double high, double soft) {
+/* The instant within (low, high] from which on a touching place closes faster than `soft`, for what touches all the time:
+   a particle that rolls from a corner onto an edge round a disk or an arc, and tips that pass while edges touch elsewhere. */
+static double closes_from(int i, int j, double low, double high, double soft) {
     for (int n = 0; n < QUICK; n++) {
         double middle = 0.5 * (low + high);
         Shape a = shape_of(i, middle), b = shape_of(j, middle);
@@ -202,8 +197,8 @@ static double rolls_at(int i, int j, double low, double high, double soft) {
    is the bound of `fastest_of`. Two particles may be left to the next step up to a faster approach, see `left_by_corners`. */
 double meet_corners(int i, int j, double from, double until, double most, double soft) {
     double span = until - from, small = inner_of(i, j), near = TOUCH * small;
-    double h = 0, first = INFINITY, gap[CANDIDATES], closes;
-    int sides[MOST_CORNERS], in_reach[CANDIDATES], many = 0, closed, clear;
+    double h = 0, first = INFINITY, gap[CANDIDATES], closes, deep = 0, checked = from;
+    int on[CANDIDATES], in_reach[CANDIDATES], many = 0, closed;
     if (!(span > 0) || most <= soft) return INFINITY;
     Shape a = shape_of(i, from), b = shape_of(j, from);
     int count = a.count + b.count, on_segment = b.s && b.s->shape == SEGMENT, both = !b.s && b.round < 0;
@@ -213,7 +208,7 @@ double meet_corners(int i, int j, double from, double until, double most, double
     if (fastest > 0) least_stride = MIN(least_stride, TURNS / fastest);
     if (are_apart(&a, &b, most * span + near)) return INFINITY;
     closed = both && overlap(&a, &b);
-    clear = both && !closed;
+    if (closed) deep = MAX(a.clear, b.clear);
     /* On something round all corners are one candidate: when one leaves, the next may arrive. */
     int rolls = b.round >= 0 && span * (fabs(W.disks[i].spin) + (j < 0 ? 0 : fabs(W.disks[j].spin))) > ROLLS;
     for (int c = 0; c < count; c++) {
@@ -222,13 +217,14 @@ double meet_corners(int i, int j, double from, double until, double most, double
         if (both && (c < a.count ? off_edge(&b, b.facing, a.p[c]) : off_edge(&a, a.facing, b.p[c - a.count])) > most * span)
             continue;
         /* Its side does not change within a step. */
-        if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c, near);
+        if (on_segment && c < a.count) now.on = on[c] = side_of(&a, b.s, c, near);
         gap[c] = gap_at(&a, &b, near, &now);
         closed |= gap[c] <= 0;
         if (gap[c] > most * span) continue;
-        /* A closed gap to another polygon closes faster than is left to the next step only if rotation makes it. */
-        if (!both || (gap[c] > 0 ? least_gap(i, j, &a, &b, from, span, bends, &now) <= 0 : bends * span > soft))
-            in_reach[many++] = c;
+        if (both) candidate_gap(i, j, a.count, c, from, near, &closes, on + c);
+        /* Rotation of both accelerates a corner's gap to an edge by at most `bends`. A closed one closes faster than is left
+           to the next step only by that. */
+        if (!both || (gap[c] > 0 ? gap[c] <= (closes + 0.5 * bends * span) * span : bends * span > soft)) in_reach[many++] = c;
     }
     if (closed && (!both || may_close(i, j, &a, &b, from, soft)) && closes_faster(i, j, &a, &b, from, 0, soft)) return from;
     while (h < span && first == INFINITY && many) {
@@ -240,21 +236,24 @@ double meet_corners(int i, int j, double from, double until, double most, double
         h = MIN(h + MAX(least / most, least_stride), span);
         double t = h < span ? from + h : until;
         Shape a2, b2;
+        int passes = 0;
         if (!both) a2 = shape_of(i, t), b2 = shape_of(j, t);
         for (int n = 0; n < many; n++) {
             int c = in_reach[n];
             Touch now = {.which = c};
-            if (on_segment && c < a.count) now.on = sides[c];
+            if (on_segment && c < a.count) now.on = on[c];
             double before = gap[c];
+            int edge = on[c];
             /* The surface may have been moved to the time of another root. */
             if (j < 0) b2.s = surface_at(-1 - j, t);
-            gap[c] = both ? candidate_gap(i, j, a.count, c, t, &closes) : gap_at(&a2, &b2, near, &now);
+            gap[c] = both ? candidate_gap(i, j, a.count, c, t, near, &closes, on + c) : gap_at(&a2, &b2, near, &now);
             if (before <= 0 && gap[c] < before && b.round >= 0 && c - a.count == b.round
                 && closes_faster(i, j, &a2, &b2, t, TOUCHING * small, soft))
-                first = MIN(first, rolls_at(i, j, last, t, soft));
+                first = MIN(first, closes_from(i, j, last, t, soft));
             /* It closes fast enough at the end of the stride, which is soon enough. */
             if (both && before <= 0 && gap[c] < before && closes > soft && closes > left_by_corners(i, j, gap[c], t))
                 first = MIN(first, t);
+            passes |= both && (on[c] != edge || on[c] & (on[c] - 1)) && MIN(before, gap[c]) <= most * (t - last);
             if (!(before > 0 && gap[c] <= 0)) continue;
             double then = both ? corner_root(i, j, c, last, t, before, gap[c], most)
                                : root_of(i, j, &now, last, t, before, gap[c], most);
@@ -262,17 +261,21 @@ double meet_corners(int i, int j, double from, double until, double most, double
             Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
             if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
         }
-        /* A tip that passes through a tip within a stride is inside nothing after it, but edges cross then, also before
-           a corner enters. */
-        if (!clear || most * (t - last) < near) continue;
+        /* A tip that passes through a tip, from one edge beyond the next, is inside nothing after it, but edges cross then,
+           also before a corner enters. */
+        if (!passes || most * (t - checked) < near) continue;
         double end = MIN(t, first);
         a2 = shape_of(i, end);
         b2 = shape_of(j, end);
-        clear = are_apart(&a2, &b2, first < INFINITY ? -TOUCHING * small : 0);
-        if (clear) continue;
-        double then = overlap_at(i, j, last, end);
-        Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
-        if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
+        double then_deep = are_apart(&a2, &b2, first < INFINITY ? -TOUCHING * small : 0) ? 0 : MAX(a2.clear, b2.clear);
+        if (then_deep < 0 && deep == 0) {
+            double then = overlap_at(i, j, checked, end);
+            Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
+            if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
+        } else if (then_deep < deep && closes_faster(i, j, &a2, &b2, end, TOUCHING * small, soft))
+            first = closes_from(i, j, checked, end, soft);
+        deep = then_deep;
+        checked = end;
     }
     return first;
 }

@@ -166,6 +166,7 @@ static int are_apart_along(Shape *a, const Shape *b, double by) {
         found = e;
     }
     a->facing = found;
+    a->clear = best;
     return 0;
 }
 
@@ -328,20 +329,27 @@ int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
 double inner_of(int i, int j) { return j < 0 ? W.disks[i].inner : MIN(W.disks[i].inner, W.disks[j].inner); }
 
 /* Whether two polygons overlap, after `are_apart` has found the edges that separate them most. */
-int overlap(const Shape *a, const Shape *b) {
-    return clear_of(a, a->facing, b) < 0 && clear_of(b, b->facing, a) < 0;
-}
+int overlap(const Shape *a, const Shape *b) { return a->clear < 0 && b->clear < 0; }
 
-/* The place of two polygons that overlap although no corner is inside the other one: a tip has passed through a tip, and
-   only edges cross. It is the deepest corner at the edge that separates them most. */
-static void find_crossing(const Shape *a, const Shape *b, Touch *t) {
-    int own = clear_of(a, a->facing, b) >= clear_of(b, b->facing, a), deepest = 0;
+/* Find the place of two polygons that overlap where a tip has passed through a tip: no corner is inside there, and only edges
+   cross. It is the deepest corner at the edge that separates the two most, beyond an end of this edge. Return whether there
+   is one: not if the corner is among the `count` places of the list, nor the tip at that end, which is inside then. */
+static int find_crossing(const Shape *a, const Shape *b, double near, const Touch *list, int count, Touch *t) {
+    int own = a->clear >= b->clear, deepest = 0;
     const Shape *edge = own ? a : b, *other = own ? b : a;
     for (int n = 1; n < other->count; n++)
         if (off_edge(edge, edge->facing, other->p[n]) < off_edge(edge, edge->facing, other->p[deepest])) deepest = n;
     t->which = own ? a->count + deepest : deepest;
     t->on = edge->facing;
     fill_in(a, b, t);
+    const double *q = other->p[deepest], *begin = edge->p[t->on];
+    double n[2], length = out_of(edge, t->on, n), along = n[0] * (q[1] - begin[1]) - n[1] * (q[0] - begin[0]);
+    int last = along > 0.5 * length ? (t->on + 1) % edge->count : t->on, tip = own ? last : a->count + last;
+    for (int k = 0; k < count; k++) {
+        if (list[k].which == t->which || (list[k].which == tip && list[k].gap <= 0)) return 0;
+        if (length_of(list[k].x - t->x, list[k].y - t->y) <= near) return 0;
+    }
+    return 1;
 }
 
 /* List the places at which a polygon and another shape have a gap below `within`, up to MOST_TOUCHES. */
@@ -367,7 +375,7 @@ int list_places_of(Shape *a, Shape *b, double near, double within, Touch *list) 
         }
         count += !known;
     }
-    if (!count && both && overlap(a, b)) find_crossing(a, b, list + count++);
+    if (both && count < MOST_TOUCHES && overlap(a, b)) count += find_crossing(a, b, near, list, count, list + count);
     for (int n = 0; n < count; n++) list[n].many = count;
     return count;
 }

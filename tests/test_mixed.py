@@ -599,7 +599,10 @@ def test_what_slides_along_a_turning_box_stays_on_it():
 
 
 def streamed(seed):
-    """Return a scene: streams of disks, boxes and polygons fall into a bin, on what is in it."""
+    """Return a scene: streams of disks, boxes and polygons fall into a bin, on what is in it.
+
+    No board can press anything against another one, or a wall: it would not give way.
+    """
     random = np.random.default_rng(seed)
 
     def one(*values):
@@ -625,11 +628,12 @@ def streamed(seed):
             "velocity": [one(0.0, 0.0, 0.5, -0.5), one(0.0, -1.0)], "start": one(0.0, 0.0, 0.3),
             "interact": True, **contact, **(turned if "shape" in shape else {}),
         })  # fmt: skip
-    wide = one(0.1, 0.2, 0.3)
+    boards = int(random.integers(3))
+    wide = one(0.25, 0.3) if boards else one(0.1, 0.2)
     walls = [[-wide, 1.5], [-wide, 0.0], [wide, 0.0], [wide, 1.5]]
     surfaces = [{"name": "bin", "points": walls, **contact}]
-    for k in range(int(random.integers(3))):
-        at = np.array([random.uniform(-0.12, 0.12), random.uniform(0.1, 0.35)])
+    for k, side in enumerate((-0.1, 0.1)[:boards]):
+        at = np.array([side, random.uniform(0.15, 0.35)])
         half, angle = one(0.03, 0.08), random.uniform(-0.8, 0.8)
         arm = half * np.array([np.cos(angle), np.sin(angle)])
         board = {"from": (at - arm).tolist(), "to": (at + arm).tolist()}

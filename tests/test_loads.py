@@ -403,12 +403,12 @@ def test_a_silo_follows_janssen_once_its_floor_gives_way():
     """F = γ B²/(2 µ K) (1 - exp(-2 µ K z/B)), so F/W = (1 - e^-x)/x with x = 2 µ K z/B.
 
     Until the floor goes down by 4 mm friction at the walls may point either way, and the floor
-    bears more. K is fitted to three depths of three seeds each.
+    bears more. K is fitted to three depths of ten seeds each.
     """
     width, mu = 0.05, 0.4
     depths, shares = [], []
     for count in (50, 100, 200):
-        for seed in range(3):
+        for seed in range(10):
             half, top = 0.5 * width, 1.6 * count * 0.006**2 * 1.05 / width + 0.03
             wall = {"restitution": 0.0, "friction": mu}
             surfaces = [
@@ -445,7 +445,8 @@ def test_a_silo_follows_janssen_once_its_floor_gives_way():
     assert error < 0.1
     assert scatter < 0.1
     # A column that leaned on no wall would press by all of its weight.
-    assert share[-3:].max() < 0.6
+    deepest = share[-10:]
+    assert deepest.mean() + 3.0 * deepest.std(ddof=1) / 10**0.5 < 0.6
 
 
 def test_a_gas_presses_by_its_energy_and_shares_it_alike():

@@ -204,9 +204,8 @@ static int add(int i, int j, double least, double bound, double h, const Touch *
     double wears = W.interact || ends ? INFINITY : time_unloaded(track->load, track->load_t) - W.t;
     /* In a corner the other surface may press it onto this one. */
     int alone = d->supports <= 1 || gone;
-    /* It leaves if the surface moves away faster than it falls. Above an open gap it only falls: by itself it is not stopped
-       there; in a crowd it is, which is less than its solves leave. */
-    double opens = c->need + (W.interact ? 0 : MAX(c->gap, 0) / h);
+    /* It leaves if the surface moves away faster than it falls. Above an open gap it only falls: it is not stopped there. */
+    double opens = c->need + MAX(c->gap, 0) / h;
     c->leaves = was_pressed && !cornered && cohesion == 0 && alone && wears > 3 * h && c->gap <= LEAVE * least && opens < least_need;
     if (c->leaves || gone) {
         c->gives = c->parts = 0;

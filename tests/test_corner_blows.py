@@ -189,3 +189,37 @@ def test_a_corner_that_slides_into_a_bend_on_a_hinge_is_struck_there():
         }, engine="contact")  # fmt: skip
         ends.append(found.ends()[1]["velocity"][0])
     assert ends[0] == pytest.approx(ends[1], abs=3e-4)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize(("tilt", "s"), [(1e-3, 2e-4), (3e-3, 5e-4), (7e-3, 5e-4)])
+def test_a_tip_beside_a_tip_presses_on_the_edge_that_it_is_on(tilt, s, first):
+    """Of two needles side by side one tip falls on the long edge of the other, beside its tip.
+
+    That tip is outside of the falling needle by s sin(tilt), less than what rounds a corner. So
+    there is one place, with J = (1 + E) v / (2 / m + (a² + b²) / I), a and b the levers of n.
+    """
+    r, gap, v = 0.016, 1e-7, 0.1
+    points = np.array([(-r, -0.1 * r), (r, 0.0), (-r, 0.1 * r)])
+    about = points - points.mean(0)
+    inertia = M * (about**2).sum() / 12.0
+    angles = np.array([pi, -tilt]) - np.arctan(0.05)
+    n = np.array([0.0, 1.0])
+    place = outline(about, [0.0, 0.0, angles[0]])[1] + np.array([s, 0.0])
+    center = place + gap * n - outline(about, [0.0, 0.0, angles[1]])[1]
+    kind = {"shape": "polygon", "points": points.tolist(), "mass": M, "spin": True}
+    rows = [{"at": [0.0, 0.0], "velocity": [0.0, 0.0]},
+            {"at": center.tolist(), "velocity": (-v * n).tolist()}]  # fmt: skip
+    rows = [{**row, "angle_deg": float(np.degrees(a)), "interact": True, "restitution": E,
+             "friction": 0.0} for row, a in zip(rows, angles, strict=True)]  # fmt: skip
+    found = chutelab.simulate({
+        "gravity": 0.0, "particle": kind, "stream": [rows[first], rows[1 - first]],
+        "surface": [{"name": "far", "from": [-9.0, -9.0], "to": [9.0, -9.0]}],
+        "run": {"until": 2e-6},
+    }, engine="contact")  # fmt: skip
+    levers = place[0], place[0] - center[0]
+    j = (1.0 + E) * v / (2.0 / M + (levers[0] ** 2 + levers[1] ** 2) / inertia)
+    end = found.at([2e-6])
+    for who, sign, lever, begin in ((first, -1.0, levers[0], 0.0), (1 - first, 1.0, levers[1], v)):
+        assert end.velocity[0, who] == pytest.approx((sign * j / M - begin) * n, abs=1e-6)
+        assert end.omega[0, who] == pytest.approx(sign * j * lever / inertia, rel=1e-4)

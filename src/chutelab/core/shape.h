@@ -13,8 +13,8 @@ typedef struct {
     const double *edges;    /* of a polygon: see `World.edges` */
     const Surface *s;
     int count, round;       /* number of points; the one with a radius, or -1 */
-    int facing;             /* of two polygons: the edge that separates the other most, and by how much, m, */
-    double clear;           /* see `are_apart` */
+    int facing;             /* of two polygons: the edge that faces the other one, see `are_apart`, */
+    double clear;           /* and how far its best edge separates the other, m */
 } Shape;
 
 /* The smaller and the larger of two numbers, without a branch. */

@@ -115,7 +115,7 @@ static double clear_of(const Shape *a, int edge, const Shape *b) {
 }
 
 /* The edge that a corner of `b` is on. If the corner is outside of `a` by `near`, that is the edge that it is furthest
-   outside of. Else it is the edge that separates the two most: with another one, a particle that overlaps by more than
+   outside of. Else it is the edge that faces `b` (see `are_apart`): with another one, a particle that overlaps by more than
    the distance of its corners would be pressed sideways. At an end of a surface, the line by which the surface continues
    from there, as long as the inner radius of `a`, counts for that: so a corner that slides off the end stays on the edge
    on which it came. */
@@ -170,10 +170,28 @@ static int are_apart_along(Shape *a, const Shape *b, double by) {
     return 0;
 }
 
-/* Whether a polygon and something else are apart by more than `by`: along an edge of either, or inside an arc. */
+/* Let that edge of a polygon face another one that is most opposite to the facing edge of that one. */
+static void face(Shape *a, const Shape *b) {
+    const double *n = b->n[b->facing];
+    double most = INFINITY;
+    for (int e = 0; e < a->count; e++) {
+        double alike = a->n[e][0] * n[0] + a->n[e][1] * n[1];
+        if (alike >= most) continue;
+        most = alike;
+        a->facing = e;
+    }
+}
+
+/* Whether a polygon and something else are apart by more than `by`: along an edge of either, or inside an arc. If two
+   polygons are not, of all edges the one that separates them most faces the other polygon, and the edge opposite faces it.
+   The best edge of the other polygon alone may be on its far side, if it is thin: all its edges overlap more there. */
 int are_apart(Shape *a, Shape *b, double by) {
-    if (are_apart_along(a, b, by)) return 1;
-    if (!b->s) return b->round < 0 && are_apart_along(b, a, by);
+    if (are_apart_along(a, b, by) || (b->round < 0 && !b->s && are_apart_along(b, a, by))) return 1;
+    if (!b->s) {
+        if (b->round < 0 && a->clear >= b->clear) face(b, a);
+        else if (b->round < 0) face(a, b);
+        return 0;
+    }
     double low = INFINITY, high = -INFINITY;
     for (int n = 0; n < a->count; n++) {
         double x = a->p[n][0] - b->s->x, y = a->p[n][1] - b->s->y;
@@ -370,8 +388,9 @@ int list_places_of(Shape *a, Shape *b, double near, double within, Touch *list) 
             if (length_of(list[n].x - now->x, list[n].y - now->y) > near) continue;
             if (c - a->count == b->round && list[n].nx * now->nx + list[n].ny * now->ny <= FLAT) continue;
             known = 1;
-            /* A corner that slides off an end leaves on the edge that is on the end. */
-            if (b->s && b->round < 0 && now->gap <= 0) list[n] = *now;
+            /* A corner that slides off an end leaves on the edge that is on the end. Of two tips, the one on the edge that
+               separates the particles most counts. */
+            if ((b->s && b->round < 0 && now->gap <= 0) || (both && a->clear > b->clear)) list[n] = *now;
         }
         count += !known;
     }

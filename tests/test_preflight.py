@@ -4,13 +4,14 @@ import os
 import re
 import time
 from dataclasses import replace
-from math import cos, inf, pi, radians, sin
+from math import acos, asin, atan2, cos, degrees, hypot, inf, nan, pi, radians, sin
 
 import numpy as np
 import pytest
 
 from chutelab import scene as sc
 from chutelab.checks.preflight import places, preflight, trial
+from chutelab.checks.preflight.passing import passings
 from chutelab.engines import pymunk
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
@@ -495,6 +496,127 @@ def test_a_string_to_a_particle_that_comes_later_is_told(start, length, told):
     said = [one.warning for one in preflight(sc.from_dict(tables)).advice]
     waits = [one for one in said if "particle 1 is released 0.07 s after particle 0" in one]
     assert len(waits) == told
+
+
+BOARD = {"name": "board", "from": [0.0, 0.0], "to": [0.5, 0.0]}
+WALL = {"name": "wall", "from": [0.3, 0.1], "to": [0.3, 1.0]}
+UPRIGHT = {"name": "board", "from": [0.0, 0.0], "to": [0.0, 0.5]}
+HUNG = {"hinge": [0.0, 0.0], "inertia": 0.01}
+AHEAD = {"name": "wall", "from": [0.3, -1.0], "to": [0.3, 1.0]}
+PEG = {"name": "wall", "center": [0.3, 0.2], "radius": 0.05}
+
+
+def passes(*surfaces, until=2.0):
+    stream = {"at": [0.0, 3.0], "velocity": [0.0, 0.0], "interact": True}
+    tables = {"surface": list(surfaces), "stream": stream, "run": {"until": until}}
+    machine = build(sc.from_dict(tables))
+    return passings(machine, simulate(machine.scene))
+
+
+@pytest.mark.parametrize(
+    ("board", "wall", "t", "degrees", "place"),
+    [
+        # The tip of a board of L = 0.5 m comes to a wall at d = 0.3 m: L sin θ = d.
+        (UPRIGHT | {"turn": -90.0}, AHEAD, asin(0.6) / (pi / 2.0), -36.8699, (0.3, 0.4)),
+        # The end (0.3, 0.1) of a wall comes to the board.
+        (BOARD | {"turn": 90.0}, WALL, atan2(0.1, 0.3) / (pi / 2.0), 18.43495, (0.3, 0.1)),
+        (BOARD | HUNG | {"stops_deg": [-90.0, 30.0]}, WALL, nan, 18.43495, (0.3, 0.1)),
+        # θ = k θ0 / 2I t² at first; from 0, with a spring: θ0 (1 - cos √(k/I) t).
+        (BOARD | HUNG | {"spring": 0.1, "rest_deg": 60.0}, WALL,
+         acos(1.0 - atan2(0.1, 0.3) / (pi / 3.0)) / 10.0**0.5, 18.43495, (0.3, 0.1)),
+        # Tangent to a circle: atan(2/3) - asin(R / D), √(D² - R²) away from the pivot.
+        (BOARD | {"turn": 90.0}, PEG, (atan2(0.2, 0.3) - asin(0.05 / hypot(0.2, 0.3))) / (pi / 2.0),
+         degrees(atan2(0.2, 0.3) - asin(0.05 / hypot(0.2, 0.3))), None),
+        # A gate that is there from 1 s on: two turns and some.
+        (BOARD | {"turn": 270.0}, WALL | {"closes_at": 1.0},
+         (2.0 * pi + atan2(0.1, 0.3)) / (1.5 * pi), 378.43495, (0.3, 0.1)),
+        # Both of two doors turn by 90 degrees per second: L sin θ = 0.4 m.
+        (UPRIGHT | {"turn": -90.0}, {"name": "wall", "from": [0.8, 0.0], "to": [0.8, 0.5],
+         "turn": 90.0}, asin(0.8) / (pi / 2.0), -degrees(asin(0.8)), (0.4, 0.3)),
+        # Through 0.3 m of 0.4 m, of which the second half is braked: 1 - 2 (1 - u)² = 3/4.
+        (UPRIGHT | {"travel": {"to": [0.4, 0.0], "at": 0.5, "in": 1.0}}, AHEAD,
+         1.5 - 0.125**0.5, 0.0, None),
+        # Upwards by A sin 2πft, A = 0.02 m, 5 Hz, to a wall that ends 0.01 m above it.
+        (BOARD | {"shake": {"by": [0.0, 0.02], "frequency": 5.0}},
+         {"name": "wall", "from": [0.3, 0.01], "to": [0.3, 1.0]}, 1.0 / 60.0, 0.0, (0.3, 0.01)),
+        # A wheel of 0.1 m about (0, 0.1) travels on the floor, v t² / 2 at first.
+        ({"name": "board", "center": [0.0, 0.1], "radius": 0.1,
+          "travel": {"to": [0.4, 0.1], "at": 0.0, "in": 1.0}}, AHEAD, 0.5, 0.0, (0.3, 0.1)),
+    ],
+)  # fmt: skip
+def test_a_moving_surface_that_passes_through_another_is_told(board, wall, t, degrees, place):
+    (found,) = passes(board, wall)
+    assert (found.surface, found.through) == ("board", "wall")
+    assert found.t == pytest.approx(t, rel=1e-6, abs=1e-4 * (wall is PEG), nan_ok=True)
+    assert np.degrees(found.turned) == pytest.approx(degrees, rel=1e-6, abs=1e-2 * (wall is PEG))
+    if place is not None:
+        assert found.place == pytest.approx(place, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "surfaces",
+    [
+        # It hangs on the end of a wall, and of one that it comes to lie on; in a corner.
+        [BOARD | HUNG | {"stops_deg": [-90.0, 90.0]},
+         {"name": "wall", "from": [0.0, 0.0], "to": [0.0, 1.0]}],
+        [BOARD | HUNG | {"stops_deg": [-80.0, 0.0]}, WALL | {"from": [0.3, 0.0]}],
+        [BOARD | HUNG | {"stops_deg": [-80.0, 80.0]},
+         {"name": "corner", "points": [[0.0, 0.6], [0.0, 0.0], [-0.5, 0.2]]}],
+        # Shut, it lies end to end with a ledge.
+        [BOARD | HUNG | {"stops_deg": [-80.0, 80.0]},
+         {"name": "ledge", "from": [0.5, 0.0], "to": [1.0, 0.0]}],
+        # Its tip clears the wall, and a housing round it, by a µm.
+        [BOARD | {"turn": 300.0},
+         {"name": "wall", "from": [0.500001, -1.0], "to": [0.500001, 1.0]}],
+        [BOARD | {"turn": 300.0}, {"name": "housing", "center": [0.0, 0.0], "radius": 0.500001}],
+        # A floor travels down between two walls, and on below them.
+        [{"name": "floor", "from": [0.1, 0.0], "to": [0.3, 0.0],
+          "travel": {"to": [0.1, -0.5], "at": 0.2, "in": 0.5}},
+         {"name": "left", "from": [0.1, -0.3], "to": [0.1, 1.0]},
+         {"name": "right", "from": [0.3, -0.3], "to": [0.3, 1.0]}],
+        # Two turn and shake as one.
+        [BOARD | {"turn": 300.0}, {"name": "blade", "from": [0.0, 0.2], "to": [0.4, 0.1],
+          "pivot": [0.0, 0.0], "turn": 300.0}],
+        # The wall is gone in time, and there again in time.
+        [BOARD | {"turn": 90.0}, WALL | {"opens_at": 0.2},
+         WALL | {"name": "late", "closes_at": 2.1}],
+    ],
+)  # fmt: skip
+def test_surfaces_that_only_touch_do_not_pass_through_each_other(surfaces):
+    assert passes(*surfaces) == []
+
+
+def test_stops_that_are_recommended_keep_a_hinge_from_passing_through(brief):
+    for stops in ({"stops_deg": [-45.0, 80.0]}, {"spring": 0.1, "rest_deg": 60.0}):
+        scene = sc.from_dict(
+            DROP | {"surface": [BOARD | HUNG | stops, WALL], "run": {"until": 1.0}}
+        )
+        (advice,) = preflight(scene).advice
+        assert "board: " in advice.warning
+        assert "it passes through wall" in advice.warning
+        assert advice.change.startswith("surface.board.stops_deg = [")
+        assert advice.settings["surface.board.stops_deg"][1] == 18.4
+        assert preflight(scene.with_values(advice.settings)).advice == ()
+
+
+def test_each_pair_that_passes_through_is_told_once_and_one_that_crosses_is_not(brief):
+    """Blades up to 0.36 m away from their axis, which is as far from that of the drive pulley."""
+    blades = {"points": [[0.15, 0.2], [0.5, 0.2], [0.5, 0.5]], "pivot": [0.3, 0.2], "turn": 200.0}
+    tables = {
+        "incoming": {"speed": 2.0, "pulley_radius": 0.1},
+        "surface": [
+            blades | {"name": "wheel"},
+            {"name": "wall", "from": [0.4, 0.1], "to": [0.4, 0.3]},
+            {"name": "ceiling", "from": [-1.0, 0.52], "to": [2.0, 0.52]},
+            {"name": "beyond", "from": [-1.0, 0.57], "to": [2.0, 0.57]},
+        ],
+        "run": {"until": 2.0},
+    }
+    said = [one.warning for one in preflight(sc.from_dict(tables)).advice]
+    through = [one.split(",")[0] for one in said if "wheel: " in one]
+    others = ("incoming", "the drive pulley", "ceiling")
+    assert sorted(through) == sorted(f"wheel: it passes through {one}" for one in others)
+    assert "wall: it crosses wheel" in said
 
 
 def test_a_release_between_the_sides_of_a_conveyor_is_warned_of():

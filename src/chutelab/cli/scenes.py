@@ -275,9 +275,9 @@ def check(scenes: Annotated[Texts, complete_scene], *, set_: Texts, json_: bool)
 
     For a scene without errors it says what is built and what is skipped, which engine runs and why,
     how much time and memory a run takes, what the closed form covers, and for each warning what to
-    change. There are warnings, for example, for surfaces that cross, a plate that leaves a crowd
-    less than three grains above the belt, a box that is filled through walls, and a bed that rides
-    a slow belt by adhesion.
+    change. There are warnings, for example, for surfaces that cross, a moving surface that passes
+    through another, a plate that leaves a crowd less than three grains above the belt, a box that
+    is filled through walls, and a bed that rides a slow belt by adhesion.
 
     Time and memory are measured in a trial run, which is stopped after 1 s. For longer runs they
     are estimated from how much of the run the trial covered, or are not given. The additional cost

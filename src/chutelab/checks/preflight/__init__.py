@@ -5,6 +5,7 @@ before they are recommended.
 
 - `trial`: `Preflight` and its parts: what will be built, what the closed form answers, what a run
   costs, estimated from one that is cut off after 1 s.
+- `passing`: moving surfaces that pass through others.
 """
 
 from __future__ import annotations
@@ -13,12 +14,13 @@ import os
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
-from math import ceil, cos, floor, inf, isnan, log10, pi, radians
+from math import ceil, copysign, cos, degrees, floor, inf, isnan, log10, pi, radians
 from time import process_time
 from typing import Any, Final
 
 import numpy as np
 
+from chutelab.checks.preflight.passing import Passing, passings, turned
 from chutelab.checks.preflight.trial import (
     Advice,
     Effort,
@@ -54,8 +56,10 @@ Settings = dict[str, Any]
 EXIT = REASONS.index("exit")
 
 LEAVE = "if it is meant, leave it; the first contact wins"
+ROOM = "if no particle comes between them, leave it; or shorten one, or end the motion before"
 LOOK = "look at the picture (--out DIR --only png) for what turns it away"
-"""Advice if no setting is known to help: for surfaces that cross, and for other warnings."""
+"""Advice if no setting is known to help: for surfaces that cross, for those that pass through each
+other, and for other warnings."""
 
 SMALL = 0.002
 """m; a smaller radius is beyond what pymunk resolves in SI units."""
@@ -269,6 +273,11 @@ def advice(
         yield _advised(str(caution), mended, otherwise=LEAVE if caution.crosses else LOOK)
     if (more := len(machine.warnings) - MOST_CAUTIONS) > 0:
         yield _advised(f"{more:,} further pairs of surfaces cross", otherwise=LEAVE)
+    passing = passings(machine, tried.recording)
+    for one in passing[:MOST_CAUTIONS]:
+        yield _through(scene, machine, one)
+    if (more := len(passing) - MOST_CAUTIONS) > 0:
+        yield _advised(f"{more:,} further pairs of surfaces pass through", otherwise=ROOM)
     yield from _densities(scene)
     yield from places(scene, machine)
     if steps is not None and not steps.safe and steps.way is not None and steps.longest is not None:
@@ -320,6 +329,32 @@ def advice(
             {"run.engine": "auto"},
             after=", for the exact engine, which needs no steps",
         )
+
+
+def _through(scene: Scene, machine: Machine, passing: Passing) -> Advice:
+    """Warn of a surface that passes through another; recommend stops for a hinge."""
+    warning = f"{passing}; a particle between them has nowhere to go"
+    mover = machine.mover(machine.surfaces.index(passing.surface))
+    if mover is None or mover.hinge is None:
+        return _advised(warning, otherwise=ROOM)
+    stops = [stop if abs(stop) <= pi else copysign(pi, stop) for stop in mover.hinge.stops]
+    for one in turned(machine, mover, (stops[0], stops[1])):
+        side = int(one.turned > 0.0)
+        stops[side] = min(stops[side], one.turned, key=abs)
+    # A stop at which it only touches, to 0.1 degrees.
+    whole = [int(10.0 * degrees(stop)) / 10.0 for stop in stops]
+    plates = {plate.name or "plate": n for n, plate in enumerate(scene.plates)}
+    head = f"surface.{passing.surface}"
+    if passing.surface in plates:
+        head = scene.head("plate", plates[passing.surface])
+    settings: Settings = {f"{head}.stops_deg": whole}
+    try:
+        build(scene.with_values({**settings, "expect": None}))
+    except SceneError:
+        settings = {}
+    return _advised(
+        warning, settings, after="; if no particle comes between them, leave it", otherwise=ROOM
+    )
 
 
 def _advised(

@@ -53,6 +53,10 @@ settled."""
 TAKES = 0.05
 """Greatest share of its speed that drag takes from a particle in a step."""
 
+ROUNDING = float(np.finfo(float).eps)
+"""An impulse p changes the velocity of a mass m with an error of this share of p/m, and the energy
+with one of this share of p²/m."""
+
 _BODY = (
     batch.BodyFields.BODY_ID
     | batch.BodyFields.POSITION
@@ -89,6 +93,8 @@ class Shared:
         p, starts, faces = machine.particle, machine.releases, world.faces
         rows = count + len(faces)
         self.radius = np.zeros(rows)
+        self.light = np.zeros(rows)  # 1/kg; 0 of a surface
+        self.light[:count] = 1.0 / machine.particle.mass
         self.radius[:count], self.broad = p.radius, machine.broad
         self.shapes = Shapes(machine, world)
         self.bodies, self.corners = self.shapes.bodies, self.shapes.corners
@@ -411,7 +417,9 @@ class Shared:
         pair = other < self.count
         if self.machine.triggers:
             self._touched({*self.surface[other[~pair]].tolist()})
-        if (sums[1:3] < 0.0).any():
+        gained = -np.minimum(sums[1:3], 0.0).sum()
+        rounding = ROUNDING * ((push**2 + rub**2) * (self.light[one] + self.light[other])).sum()
+        if gained > rounding:
             balance(sums[1:3], one, np.where(pair, other, one), self.count)
         self.recorder.by_surface[-1] += sums[:3] @ pair
         for k in np.flatnonzero(pair) if self.rides else ():

@@ -620,6 +620,39 @@ def thrown(seed):
     return shapes, places, velocities, random.uniform(-pi, pi, 2), random.uniform(-60.0, 60.0, 2)
 
 
+def test_needles_that_whirl_past_each_other_strike_with_their_tips():
+    """A tip sweeps through another one between two looks. By separating axes, as below."""
+    random, met, r, middle = np.random.default_rng(8), 0, 0.01, 1e-3
+    needle = np.array([[-0.5 * r, -0.075 * r], [r, 0.0], [-0.5 * r, 0.075 * r]])
+    kind = {"shape": "polygon", "points": needle.tolist(), "mass": 0.01, "spin": True}
+    for draw in range(40):
+        spins = random.choice([-1.0, 1.0], 2) * random.uniform(200.0, 600.0, 2)
+        angles = np.array([0.0, pi]) + random.uniform(-0.01, 0.01, 2) - spins * middle
+        places = np.array([[0.0, 0.0], [2.0 * r - random.uniform(2e-5, 2e-4), 0.0]])
+        recording = run({
+            "gravity": 0.0, "particle": kind,
+            "surface": [{"name": "far", "from": [-5.0, -5.0], "to": [5.0, -5.0]}],
+            "stream": [{"at": at.tolist(), "velocity": [0.0, 0.0], "angle_deg": degrees(angle),
+                        "omega": spin, "interact": True}
+                       for at, angle, spin in zip(places, angles, spins, strict=True)],
+            "run": {"until": 2.0 * middle},
+        })  # fmt: skip
+
+        def gap(t, places=places, angles=angles, spins=spins):
+            ways = zip(places, angles + spins * t, strict=True)
+            return apart(*(at + turned(needle, angle) for at, angle in ways))
+
+        t = 0.0
+        while t < 2.0 * middle and gap(t) > 1e-10:
+            t += gap(t) / (r * np.abs(spins).sum())
+        if t < 2.0 * middle and min(gap(t + 1e-7 * n) for n in range(9)) < -1e-7:
+            met += 1
+            struck = recording.select("collision")["t"]
+            assert len(struck), draw
+            assert struck[0] == pytest.approx(t, abs=1e-9), draw
+    assert met > 20
+
+
 # Of draws 12, 97, 383 and 442 two tips pass just before a corner enters.
 @pytest.mark.parametrize("draws", [range(100), [383, 442]])
 def test_polygons_strike_each_other_when_they_begin_to_overlap(draws):

@@ -3,7 +3,7 @@
 #include "shape.h"
 
 /* Least number of steps in which gaps are checked over a span. A contact that begins and ends within one is left to the
-   next step. */
+   next step, except one of two tips. */
 #define STRIDES 8
 /* rad; in none of them either of the two rotates by more. */
 #define TURNS 0.0125
@@ -97,6 +97,23 @@ static double corner_gap(int i, int corner, int j, double t, double near, double
 /* The same for a candidate of two polygons; `count` is the number of corners of the first one. */
 static double candidate_gap(int i, int j, int count, int which, double t, double near, double *closes, int *on) {
     return which < count ? corner_gap(i, which, j, t, near, closes, on) : corner_gap(j, which - count, i, t, near, closes, on);
+}
+
+/* A time within (low, high) at which a corner of a polygon that is outside of another one at both is inside it, and its gap
+   then; or `high`. The search goes to where the gap changes from closing to opening. */
+static double dip_of(int i, int j, int which, double low, double high, double *gap) {
+    double closes, end = high;
+    int on;
+    for (int n = 0; n < QUICK; n++) {
+        double t = 0.5 * (low + high), then = candidate_gap(i, j, W.disks[i].corners, which, t, 0, &closes, &on);
+        if (then <= 0) {
+            *gap = then;
+            return t;
+        }
+        if (closes > 0) low = t;
+        else high = t;
+    }
+    return end;
 }
 
 /* The instant within (low, high] at which the gap of a corner of a polygon to another one closes, from `above` 0 to `below`,
@@ -253,10 +270,15 @@ double meet_corners(int i, int j, double from, double until, double most, double
             /* It closes fast enough at the end of the stride, which is soon enough. */
             if (both && before <= 0 && gap[c] < before && closes > soft && closes > left_by_corners(i, j, gap[c], t))
                 first = MIN(first, t);
-            passes |= both && (on[c] != edge || on[c] & (on[c] - 1)) && MIN(before, gap[c]) <= most * (t - last);
-            if (!(before > 0 && gap[c] <= 0)) continue;
-            double then = both ? corner_root(i, j, c, last, t, before, gap[c], most)
-                               : root_of(i, j, &now, last, t, before, gap[c], most);
+            int at_tip = both && (on[c] != edge || on[c] & (on[c] - 1)) && MIN(before, gap[c]) <= most * (t - last);
+            passes |= at_tip;
+            double end = t, least = gap[c];
+            /* It may have come in by one edge and gone out by the next. */
+            if (at_tip && before > 0 && least > 0 && closes < 0 && before + least <= most * (t - last))
+                end = dip_of(i, j, c, last, t, &least);
+            if (!(before > 0 && least <= 0)) continue;
+            double then = both ? corner_root(i, j, c, last, end, before, least, most)
+                               : root_of(i, j, &now, last, t, before, least, most);
             if (then >= first) continue;
             Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
             if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;

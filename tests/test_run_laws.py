@@ -250,6 +250,38 @@ def test_what_tracks_leave_out_is_no_gain(g, share, seen):
 
 
 @pytest.mark.parametrize(("share", "seen"), [(0.9, False), (1.1, True)])
+def test_a_lower_hop_by_rotation_gives_back_what_a_higher_one_took(share, seen):
+    """A square that spins without gravity presses a disk along, with a velocity w <= a h / 2.
+
+    (a h)² <= 9.81 8e-3 r, with r its inner radius, so m w² / 2 <= m 9.81 8e-3 r / 8.
+    """
+    m, side = 0.01, 0.0278
+    pair = {"interact": True, "restitution": 0.3, "friction": 1.0}
+    tables = {
+        "gravity": 0.0,
+        "particle": [{"name": "square", "shape": "box", "size": [side, side], "mass": m},
+                     {"name": "disk", "radius": 0.0148, "mass": m}],
+        "surface": [{"name": "far", "from": [-9.0, -9.0], "to": [9.0, -9.0]}],
+        "stream": [{"particle": "square", "at": [0.0, 0.0], "velocity": [0.0, 0.0],
+                    "omega": -75.9, "angle_deg": 38.0, **pair},
+                   {"particle": "disk", "at": [-0.0222, -0.0184], "velocity": [-0.533, 0.668],
+                    "omega": 15.6, **pair}],
+        "run": {"until": 0.02},
+    }  # fmt: skip
+    for kind in tables["particle"]:
+        kind["spin"] = True
+    whole = judged(scene.from_dict(tables, "test"), engine="contact")
+    bound = m * 9.81 * 8e-3 * 0.5 * side / 8.0
+    assert whole.laws == ()
+    assert 0.0 < np.diff(whole.totals["kinetic"][1:]).max() < bound
+
+    def give(knots):
+        knots["entries"][-1, 1] -= share * bound
+
+    assert (laws.LOSSES in names(spoilt(whole, knots=give))) == seen
+
+
+@pytest.mark.parametrize(("share", "seen"), [(0.9, False), (1.1, True)])
 def test_overlaps_give_back_what_parting_them_may(share, seen):
     """Two disks overlap by 2 %: (p d / h)² M / 0.012, p d = (2/3) (0.02 - 0.001) r, at most 1 %."""
     rows = [{"at": [x, 0.0], "velocity": [0.0, 0.0], "interact": True} for x in (0.0, 0.5)]

@@ -73,6 +73,7 @@ void scan_machine(void) {
         All.mass += body->mass;
         All.lightness += 1 / body->mass;
         All.weight += body->mass * body->gravity;
+        if (body->corners) All.cornered += body->mass * body->radius;
         All.heaviest = MAX(All.heaviest, body->mass);
         All.gravity = MAX(All.gravity, body->gravity);
         All.smallest = i ? MIN(All.smallest, body->radius) : body->radius;
@@ -222,7 +223,8 @@ static double energy_share(void) {
 
 /* Energy that the removal of overlaps may give, J: at most what lifts all particles by the greatest overlap, against
    pushes by hand, too. On a surface that accelerates by a they also hop by a h^2 / 8 in a step h, with a h^2 at most FALL
-   r. For lone particles a knot in contact has the mean velocity of a step, which differs from its ledger by half a step's
+   r. A corner that comes back by rotation hops no faster than by a weight, without gravity by that on Earth: by a h / 2
+   with (a h)^2 at most g FALL r. For lone particles a knot in contact has the mean velocity of a step, which differs from its ledger by half a step's
    acceleration: that of gravity along the path, and that of an arc across it. Two that a cohesion F holds hop by it with
    the energy (F h)^2 / 4 m, half of m being the mass of their relative motion; each has three such contacts. */
 static double energy_parted(void) {
@@ -234,6 +236,7 @@ static double energy_parted(void) {
     double hop = L.alike ? 0 : MIN(FALL * All.smallest, L.haste * square(L.dt)) / 8;
     double allowed = All.mass * ((All.gravity + L.hastened) * L.late + L.haste * hop);
     if (!L.alike) allowed += 0.75 * square(L.cohesion * L.dt) * All.lightness;
+    if (!L.alike && All.gravity == 0) allowed += EARTH * FALL / 8 * All.cornered;
     if (L.alike) {
         /* The pymunk engine leaves out contacts that move a track by less than LEAVES_OUT of the radius. A cubic with an
            end velocity that is off by w is off by 4/27 w tau in place, where tau is a step or more. */

@@ -42,11 +42,11 @@ typedef struct { int particles, particle, latest, knot; } Group;
 
 /* Sums over all particles, and the largest and least values of one. `lightness` sums 1 / mass. `size` is of pieces: the
    largest coordinate and length of segments, coordinate and radius of arcs; `belts` their largest speed. `whirl` is the
-   largest speed of a corner by rotation, m/s; `reach` the largest coordinate or length of anything, m. For particles that
+   largest speed of a corner by rotation, m/s; `cornered` sums mass times radius, kg m, of what has corners; `reach` the largest coordinate or length of anything, m. For particles that
    do not meet also the energy that is unexplained at their ends, J, its largest change between two knots, and the least
    value of `given_back`. */
 struct Sums {
-    double mass, lightness, weight, heaviest, smallest, gravity, size[4], belts;
+    double mass, lightness, weight, cornered, heaviest, smallest, gravity, size[4], belts;
     double t, knot_t, place, reach, fastest, whirl, lifted, entries[3], residual, change, back;
     Group bad;
     int unreal;

@@ -1,6 +1,7 @@
 // The numbers of a crowd: counts, flow, arrivals, power of belts, losses at surfaces.
 
 import type { Arrival } from "./arrival.ts";
+import { isPaid } from "./machine.ts";
 import type { Recording } from "./recording.ts";
 
 /** Counts of particles that touched the outgoing belt or what lies on it, and the belt itself; flow
@@ -60,7 +61,9 @@ function crowdOf(
   const squares = places.reduce((sum, x) => sum + (x - mean) ** 2, 0);
   const { belt_work, start } = recording.ledger(end);
   // Without drives it is rounding.
-  const work = Math.abs(belt_work) > 1e-12 * start ? belt_work : 0;
+  // Without drives there is none; a run that is computed in part may end within an impact, where a
+  // hinge does not yet have what a ball has lost.
+  const work = isPaid(machine) && Math.abs(belt_work) > 1e-12 * start ? belt_work : 0;
   const names = [...machine.surfaces, "particles"];
   const losses = (books ?? []).map(([, restitution, friction], row) =>
     [names[row], restitution + friction] as [string, number]);

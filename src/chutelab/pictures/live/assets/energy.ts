@@ -2,6 +2,7 @@
 
 import { card, follow, html, icon } from "./panels.ts";
 import type { Lab } from "./lab.ts";
+import { isDriven, isPaid } from "./machine.ts";
 import type { Recording, Ledger } from "./recording.ts";
 import type { Words } from "./words.ts";
 
@@ -19,9 +20,9 @@ const KEPT: Record<string, string[]> = { spring: ["spring", "stiffness"], damper
 /** A residual below this part of the whole is rounding, and not shown. */
 const TINY_RESIDUAL = 1e-12;
 
-/** A work below this part of the whole, in a machine without drives, is not shown: what holds a
- * hinge does that much. */
-const TINY_WORK = 1e-7;
+/** A work below this part of the whole, in a machine without drives, is not shown: within a step
+ * the paths of particles and those of hinges are interpolated apart, which leaves up to 2e-4. */
+const TINY_WORK = 1e-3;
 
 /** J; less is shown as 0. */
 const UNSEEN = 5e-13;
@@ -55,7 +56,6 @@ class EnergyPanel {
   closes = html("p", { class: "good" });
   zero = html("p", { class: "note" });
   /** Whether any surface, or any belt, is driven. */
-  driven = false;
   paid = false;
 
   constructor(home: Element, readonly lab: Lab, readonly words: Words) {
@@ -76,10 +76,9 @@ class EnergyPanel {
     lab.on("run", () => {
       this.longest = 0;
       if (!lab.machine) return;
-      const { movers, segments, arcs } = lab.machine;
-      this.driven = movers.some(({ inertia, motor }) => !inertia || motor.some(Boolean));
-      this.paid = this.driven || [...segments, ...arcs].some(({ speed }) => speed);
-      given.textContent = words.say(this.driven ? "energy-drives" : "energy-belt_work");
+      const { segments, arcs } = lab.machine;
+      this.paid = isPaid(lab.machine);
+      given.textContent = words.say(isDriven(lab.machine) ? "energy-drives" : "energy-belt_work");
       const stands = segments.length || arcs.length;
       this.zero.textContent = words.say(stands ? "energy-note" : "energy-note-free");
     });

@@ -100,6 +100,14 @@ const MANY = 100;
 /** ... up to this, s on Earth. */
 const MOST_STEP = 2e-3;
 
+/** Whether a surface moves by a drive, not only on a hinge. */
+export const isDriven = ({ movers }: Machine) =>
+  movers.some(({ inertia, motor }) => !inertia || motor.some(Boolean));
+
+/** Whether a drive, or a belt, does work. */
+export const isPaid = (machine: Machine) =>
+  isDriven(machine) || [...machine.segments, ...machine.arcs].some(({ speed }) => speed !== 0);
+
 /**
  * Builds the machine of a scene.
  * @throws {Fault} if the geometry contradicts itself

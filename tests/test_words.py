@@ -282,3 +282,28 @@ def test_shipped_scenes_have_a_title_in_each_language():
         assert words().say(f"title-{name}") == load(name).title
     german = words("de").titles()
     assert all(german[title] != title for title in german)
+
+
+def test_parts_of_shipped_scenes_have_a_name_in_each_language_and_it_is_no_other_text():
+    """The stream "first" of the drum was called "Say who I am", which was a text of lessons."""
+    own = re.compile(r"[^.!?]{1,26}")
+    folder = STRINGS.parents[1] / "pictures" / "live" / "assets" / "strings"
+    known = {
+        language: {
+            key.removeprefix("name-"): text
+            for key, text in json.loads((folder / f"{language}.json").read_text("utf-8")).items()
+            if key.startswith("name-")
+        }
+        for language in LANGUAGES
+    }
+    for language, texts in known.items():
+        assert [text for text in texts.values() if not own.fullmatch(text)] == [], language
+    for name in shipped():
+        scene = load(name)
+        for part in (*scene.free, *scene.sensor, *scene.streams, *scene.particles):
+            if part.name is None or part.name in ("plate", "stream"):
+                continue
+            stem = re.sub(r" \d+$", "", part.name)
+            # "left" is a wall.
+            assert known["en"][stem] in (stem.replace("_", " "), f"{stem} wall"), (name, stem)
+            assert known["de"][stem] != stem

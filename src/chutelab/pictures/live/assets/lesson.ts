@@ -212,7 +212,7 @@ class Lesson {
       html("h2", { tabindex: "-1" }, lesson.title), html("p", { class: "ask" }, lesson.question),
       html("label", { for: "student" }, html("b", {}, words.say("exercise-name"))),
       html("div", { class: "row" }, name, go),
-      html("p", { class: "note", id: "student-note" }, words.say("name-note")));
+      html("p", { class: "note", id: "student-note" }, words.say("student-note")));
     this.list.replaceChildren();
     this.sheet.classList.add("start");
     (document.getElementById("guess") as HTMLElement).hidden = true;
@@ -510,8 +510,8 @@ class Lesson {
     const { task, lab, words, step } = this;
     if (step.kind !== "numbers" || !lab.data.exercise) return [];
     if (!task) {
-      return [html("p", {}, words.say("name-note")),
-        html("button", { class: "main", click: () => this.leave() }, words.say("name-first"))];
+      return [html("p", {}, words.say("student-note")),
+        html("button", { class: "main", click: () => this.leave() }, words.say("student-first"))];
     }
     return [new Questions(lab, words, task, this.newEngine, () => {
       if (this.curtain.hides && task.mayRun) this.curtain.set(false);

@@ -30,7 +30,7 @@ function asked({ words, kept }: Lesson, ask: Ask, id: string) {
 
 /** The exercise with the student's own numbers; none without a name. */
 function numbers({ task, words }: Lesson) {
-  if (!task) return [html("p", {}, words.say("name-note"))];
+  if (!task) return [html("p", {}, words.say("student-note"))];
   return [
     html("p", {}, task.rows.map(([symbol, value]) => `${symbol} = ${value}`).join("; ")),
     html("p", {}, task.story),

@@ -98,7 +98,7 @@ class Tools {
     const bar = html("div", { class: "tools", role: "group", "aria-label": words.say("tools") });
     document.getElementById("fit")?.after(bar);
     for (const name of [...(flow ? ["flow"] : []), "tape", "protractor", "watch", "tracer"]) {
-      const button = iconButton(`tool-${name}`, name, words.say(`name-${name}`), () =>
+      const button = iconButton(`tool-${name}`, name, words.say(`tool-${name}`), () =>
         this.toggle(name, button));
       button.setAttribute("aria-pressed", "false");
       bar.append(button);
@@ -353,7 +353,7 @@ class Tools {
       return html("button", { id, click }, words.say(id));
     };
     this.starter = button("watch-start", () => watch.toggle(lab.t));
-    const named = { class: "watch", role: "group", "aria-label": words.say("name-watch") };
+    const named = { class: "watch", role: "group", "aria-label": words.say("tool-watch") };
     const panel = html("div", named,
       this.dial, this.starter, button("watch-lap", () => watch.lap(lab.t)),
       button("watch-reset", () => watch.reset()), this.laps);

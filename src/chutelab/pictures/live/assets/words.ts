@@ -29,9 +29,9 @@ class Words {
 
   /** Returns the name of a surface or stream: known names are translated, others unchanged. */
   name(name: string) {
-    const [, stem, number] = /^([a-z]+)(\d+)$/.exec(name)
+    const [, stem, number] = /^([a-z]+) ?(\d+)$/.exec(name)
       ?? /^(material|pair|string|rod|spring|pin) (.*)$/.exec(name) ?? [];
-    const part = this.catalogue[`part-${stem}`];
+    const part = this.catalogue[`part-${stem}`] ?? this.catalogue[`name-${stem}`];
     return this.catalogue[`name-${name}`] ?? (part ? `${part} ${number}` : name);
   }
 

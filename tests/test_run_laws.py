@@ -282,20 +282,28 @@ def test_a_lower_hop_by_rotation_gives_back_what_a_higher_one_took(share, seen):
 
 
 @pytest.mark.parametrize(("share", "seen"), [(0.9, False), (1.1, True)])
-def test_overlaps_give_back_what_parting_them_may(share, seen):
-    """Two disks overlap by 2 %: (p d / h)² M / 0.012, p d = (2/3) (0.02 - 0.001) r, at most 1 %."""
-    rows = [{"at": [x, 0.0], "velocity": [0.0, 0.0], "interact": True} for x in (0.0, 0.5)]
-    tables = {"gravity": 0.0, "particle": {"radius": 0.01, "mass": 0.01},
+@pytest.mark.parametrize("angle", [None, 0.0, 45.0])
+def test_overlaps_give_back_what_parting_them_may(angle, share, seen):
+    """Two disks or squares overlap by 2 % of the inner radius, faces or a face and a corner.
+
+    (p d / h)² M / 0.012, p d = (2/3) (0.02 - 0.001) r, at most 1 %.
+    """
+    round_, square = {"radius": 0.01}, {"shape": "box", "size": [0.02, 0.02], "spin": True}
+    turned = {} if angle is None else {"angle_deg": angle}
+    rows = [{"at": [x, 0.0], "velocity": [0.0, 0.0], "interact": True, **more}
+            for x, more in ((0.0, {}), (0.5, turned))]  # fmt: skip
+    tables = {"gravity": 0.0, "particle": {"mass": 0.01, **(square if turned else round_)},
               "stream": [{"name": f"one-{n}", **row} for n, row in enumerate(rows)],
               "run": {"until": 0.5, "dt": 1e-3}}  # fmt: skip
     part = min(2.0 / 3.0 * (0.02 - 0.001), 0.01) * 0.01 / 1e-3
+    away = 0.0198 if not angle else 0.01 * (1.0 + sqrt(2.0)) - 2e-4
 
     def give(knots):
-        knots["position"][:, 0] = np.repeat([0.0, 0.0198], len(knots) // 2)
+        knots["position"][:, 0] = np.repeat([0.0, away], len(knots) // 2)
         knots["entries"][-1, 1] -= share * part**2 * 0.01 / 0.012
 
-    found = names(spoilt(recorded(tables, "contact"), knots=give))
-    assert (laws.LOSSES in found) == seen
+    whole = judged(scene.from_dict(tables, "test"), engine="contact")
+    assert (laws.LOSSES in names(spoilt(whole, knots=give))) == seen
 
 
 @pytest.mark.parametrize(("shuts", "seen"), [(0.5, False), (0.7, True)])

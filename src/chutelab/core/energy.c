@@ -107,10 +107,10 @@ EXPORT double opened(double t) {
     for (int n = 0; n < count; n++) {
         int i = there[n];
         double x = at[2 * i], y = at[2 * i + 1], r = L.bodies[i].radius;
+        int own = knot_before(i, t);
         for (int k = n + 1; k < count && at[2 * there[k]] <= x + 2 * L.largest; k++) {
             int j = there[k];
-            double depth = r + L.bodies[j].radius - length_of(at[2 * j] - x, at[2 * j + 1] - y);
-            sum += sum_opened(depth, MIN(r, L.bodies[j].radius), step);
+            sum += sum_opened(depth_at(i, own, j, knot_before(j, t), t), MIN(r, L.bodies[j].radius), step);
         }
         for (int k = 0; k < L.piece_count; k++) {
             const Barrier *b = L.barriers + k;

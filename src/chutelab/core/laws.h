@@ -97,6 +97,7 @@ double angle_at(int knot, double share);
 int find_hits(int particle);
 
 /* overlaps.c */
+double depth_at(int i, int k, int j, int l, double t);
 void find_overlaps(double bound, Breach *found);
 
 #endif

@@ -173,6 +173,20 @@ static double gap_at(const Motion *a, const Motion *b, double share, double h, d
     return (gap > 0 ? away_from(cornered, disk->x, disk->y) : gap) - radius;
 }
 
+/* How deep two particles are in each other at t, in the times after two knots of theirs, m; below 0 if they are apart. */
+double depth_at(int i, int k, int j, int l, double t) {
+    const int who[2] = {i, j}, knots[2] = {k, l};
+    Motion m[2];
+    for (int n = 0; n < 2; n++) {
+        m[n].body = L.bodies + who[n];
+        m[n].knot = knots[n];
+        m[n].begin = state_at(knots[n], t, m[n].from);
+        m[n].lasts = 0;
+        memcpy(m[n].to, m[n].from, sizeof m[n].to);
+    }
+    return -gap_at(m, m + 1, 0, 0, 0);
+}
+
 /* Greatest speed at which two come nearer within motions of h seconds, m/s. */
 static double fastest_of(const Motion *a, const Motion *b, double h) {
     double v[3] = {0, 0, 0}, turns;

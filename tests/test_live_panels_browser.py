@@ -343,6 +343,36 @@ def test_a_page_shows_no_work_and_no_numbers_that_its_machine_has_not(shown, tmp
     assert "where the lowest particle is released" in page.locator("#energy").inner_text()
 
 
+@pytest.mark.parametrize("name", ["dominoes", "drum", "flap-gate"])
+def test_the_energy_of_a_crowd_is_balanced_in_every_frame(shown, name):
+    """Within a step the paths of a crowd are curves; Σ energies - Σ work + Σ losses stays."""
+    page = shown(name)
+    page.evaluate("chutelab.lab.allow(1e9)")
+    page.evaluate(DONE)
+    frames = """() => {
+      const { recording } = chutelab.lab, found = [];
+      for (let n = 0; n < 60 * recording.end; n += 1) {
+        const at = recording.ledger(n / 60);
+        const losses = at.friction_loss + at.restitution_loss + at.damper_loss;
+        const whole = at.kinetic + at.potential + at.spring;
+        found.push([whole - at.start - at.belt_work + losses, at.residual, whole + losses]);
+      }
+      return found;
+    }"""
+    off, residual, size = np.array(page.evaluate(frames)).T
+    assert np.abs(off).max() < 1e-12 * size.max()
+    assert np.abs(residual).max() < 1e-12 * size.max()
+    # What a step itself leaves is the residual.
+    missing = page.evaluate("""() => {
+      const { recording } = chutelab.lab, t = 0.301, [before, after] = recording.stepAt(t);
+      before[1] += 0.001;
+      after[1] += 0.002;
+      return [recording.ledger(t).residual, recording.stepAt(t)[2]];
+    }""")
+    assert missing[0] == pytest.approx(1e-3 + 1e-3 * missing[1], abs=1e-12)
+    assert 0.0 < missing[1] < 1.0
+
+
 def test_what_a_flap_takes_and_gives_is_no_work_of_drives(shown):
     """Between steps, and where a run is computed in part, it is not balanced to the last digit."""
     page = shown("flap-gate")

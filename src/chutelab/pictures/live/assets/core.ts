@@ -250,7 +250,7 @@ class Core extends Memory {
       knots[i * KNOT_ROW + 9] = this.ints[(this.get("knots") + i * 8 * KNOT_ROW + disk[0]) >> 2];
     }
     const events: Event[] = this.rows("events", "Event", this.get("event_count"));
-    const sums = this.machine?.joints.length ? this.get("total_count") * TOTAL_ROW : 0;
+    const sums = this.machine?.interact ? this.get("total_count") * TOTAL_ROW : 0;
     const begin = this.get("totals") >> 3, totals = this.doubles.slice(begin, begin + sums);
     this.set("knot_count", 0);
     this.set("event_count", 0);

@@ -232,6 +232,10 @@ function namesOf({ releases, streams }: Machine) {
 const trackOf = ({ outlines, releases }: Machine, i: number) =>
   new Track(outlines[releases[i].kind].length > 0);
 
+/** Entries of a ledger, with their columns of the totals, and signs in the balance. */
+const PROCESSES =
+  [["friction_loss", 5, -1], ["belt_work", 3, 1], ["restitution_loss", 4, -1]] as const;
+
 /** The tracks and events of a run, which may still be running. */
 class Recording {
   tracks;
@@ -264,7 +268,7 @@ class Recording {
   loads = new Float64Array();
   /** Times, s, and the work of all pushes and of all surfaces up to then, J. */
   pushes: [number, number, number][] = [];
-  /** With joints: totals of all particles at the steps, `TOTAL_ROW` numbers each. */
+  /** Of a crowd: totals of all particles at the steps, `TOTAL_ROW` numbers each. */
   totals: Float64Array[] = [];
   /** The laws that it breaks, once it is finished and judged. */
   breaches: Breach[] = [];
@@ -486,9 +490,9 @@ class Recording {
     return more === given ? given : work - gave - ((gives - gave) * (t - from)) / (to - from);
   }
 
-  /** The ledger with joints, which pass energy from one particle to another: linear from step to
-   * step of the engine. */
-  joinedLedger(t: number): Ledger | null {
+  /** Rows of the totals at the beginning and at the end of a step, and how much of it has passed;
+   * none without totals. */
+  stepAt(t: number): [Float64Array, Float64Array, number] | null {
     const n = this.totals.findLastIndex((all) => all[0] <= t), rows = this.totals[n];
     if (!rows) return null;
     let low = 0, high = rows.length / TOTAL_ROW;
@@ -501,7 +505,15 @@ class Recording {
     const a = row(rows, low);
     const b = (low + 1) * TOTAL_ROW < rows.length ? row(rows, low + 1)
       : row(this.totals[n + 1] ?? a, 0);
-    const s = b[0] > a[0] ? Math.min((t - a[0]) / (b[0] - a[0]), 1) : 0;
+    return [a, b, b[0] > a[0] ? Math.min((t - a[0]) / (b[0] - a[0]), 1) : 0];
+  }
+
+  /** The ledger with joints, which pass energy from one particle to another: linear from step to
+   * step of the engine. */
+  joinedLedger(t: number): Ledger | null {
+    const step = this.machine.joints.length ? this.stepAt(t) : null;
+    if (!step) return null;
+    const [a, b, s] = step;
     const [, kinetic, potential, work, restitution_loss, friction_loss, , released, kept, spring,
       damper_loss, gave] = a.map((value, k) => value + s * (b[k] - value));
     const push_work = this.pushedAt(t, work - gave), start = released + kept;
@@ -543,6 +555,20 @@ class Recording {
     // In a track the work of pushes is part of that of drives.
     total.push_work = this.pushedAt(t, total.belt_work);
     total.belt_work -= total.push_work;
+    // Particles give energy to each other within a step. The residual is that of the totals, and
+    // the rest of the balance belongs to the process that goes on among all.
+    const step = this.renamed ? null : this.stepAt(t);
+    if (step) {
+      const [a, b, s] = step;
+      const [from, to] = [a, b].map(([, kinetic, potential, work, restitution, friction, , released,
+        kept, spring, damper]) => kinetic + potential + spring - released - kept - work
+        + restitution + friction + damper);
+      const straight = from + s * (to - from), missing = total.residual - straight;
+      const [process, , sign] = PROCESSES.find(([, column]) => a[column] !== b[column])
+        ?? ["residual", 0, 1] as const;
+      total.residual = straight;
+      total[process] += sign * missing;
+    }
     return total;
   }
 

@@ -709,7 +709,7 @@ def test_the_page_turns_to_the_other_language_as_it_is(shown):
     ("language", "said"),
     [
         ("en", "The trigger of door, flap is deleted, too"),
-        ("de", "Der Auslöser von door, flap ist mit gelöscht"),
+        ("de", "Der Auslöser von door, Federklappe ist mit gelöscht"),
     ],
 )
 def test_a_trigger_that_is_deleted_with_what_it_waits_for_is_told(shown, language, said):

@@ -1,8 +1,6 @@
 /* Gauss-Seidel sweeps over the rows of a crowd, four rows at a time, in single precision. That is enough, as they end
    when velocities change by 1e-5 of their size. Rows of one colour share no disk, so one vector instruction can solve
-   four of them. Where two particles with corners touch at two places, the two rows are twins: of four such pairs of rows
-   the bodies are loaded and stored once. rows.c takes the impulses over in double precision, and explains what a row
-   does. */
+   four of them. rows.c takes the impulses over in double precision, and explains what a row does. */
 
 #include "core.h"
 
@@ -14,8 +12,7 @@
 /* Replaces infinity, which cannot be multiplied by 0. */
 #define ANY 1e30f
 
-/* Numbers of fours, of pairs of fours for twins, which come first, and of bodies. */
-static int fours, twins, bodies;
+static int fours, bodies;
 
 typedef v128_t Four;
 
@@ -27,7 +24,7 @@ static inline Four sum(Four a, Four b) { return wasm_f32x4_add(a, b); }
 static inline Four less(Four a, Four b) { return wasm_f32x4_sub(a, b); }
 static inline Four low(Four a, Four b) { return wasm_f32x4_pmin(b, a); }
 static inline Four high(Four a, Four b) { return wasm_f32x4_pmax(b, a); }
-static inline Four within(Four a, Four bound) { return low(high(a, wasm_f32x4_neg(bound)), bound); }
+static inline Four within(Four a, Four least, Four most) { return low(high(a, least), most); }
 
 static float total(Four v) {
     return (wasm_f32x4_extract_lane(v, 0) + wasm_f32x4_extract_lane(v, 1))
@@ -39,47 +36,48 @@ static float greatest(Four v) {
     return MAX(one, MAX(wasm_f32x4_extract_lane(v, 2), wasm_f32x4_extract_lane(v, 3)));
 }
 
-/* Transpose four vectors of four. */
-static inline void transpose(Four *v) {
-    Four a = wasm_i32x4_shuffle(v[0], v[1], 0, 4, 1, 5), b = wasm_i32x4_shuffle(v[2], v[3], 0, 4, 1, 5);
-    Four c = wasm_i32x4_shuffle(v[0], v[1], 2, 6, 3, 7), d = wasm_i32x4_shuffle(v[2], v[3], 2, 6, 3, 7);
-    v[0] = wasm_i64x2_shuffle(a, b, 0, 2);
-    v[1] = wasm_i64x2_shuffle(a, b, 1, 3);
-    v[2] = wasm_i64x2_shuffle(c, d, 0, 2);
-    v[3] = wasm_i64x2_shuffle(c, d, 1, 3);
+/* Interleave the first, or the last, two numbers of two vectors; join the first, or the last, halves of two. */
+static inline Four mix(Four a, Four b) { return wasm_i32x4_shuffle(a, b, 0, 4, 1, 5); }
+static inline Four mix_last(Four a, Four b) { return wasm_i32x4_shuffle(a, b, 2, 6, 3, 7); }
+static inline Four join(Four a, Four b) { return wasm_i64x2_shuffle(a, b, 0, 2); }
+static inline Four join_last(Four a, Four b) { return wasm_i64x2_shuffle(a, b, 1, 3); }
+
+/* Make vectors (x, y, rim, 0) of each of four rows. */
+static inline void each(Four *to, Four x, Four y, Four rim) {
+    Four place = mix(x, y), turn = mix(rim, all(0)), last_place = mix_last(x, y), last_turn = mix_last(rim, all(0));
+    to[0] = join(place, turn);
+    to[1] = join_last(place, turn);
+    to[2] = join(last_place, last_turn);
+    to[3] = join_last(last_place, last_turn);
 }
 
-/* Load x, y and rim of the bodies of four rows. */
-static inline void gather(const LightBody *from, const int *which, Four *v) {
-    for (int k = 0; k < 4; k++) v[k] = get(&from[which[k]].x);
-    transpose(v);
-}
-static inline void scatter(LightBody *to, const int *which, Four *v) {
-    v[3] = all(0);
-    transpose(v);
-    for (int k = 0; k < 4; k++) set(&to[which[k]].x, v[k]);
-}
-
-/* `give` of rows.c for four rows with the velocities of their bodies; `rolls` and `cornered` are true if they are for any
-   row of all. Each loop over it has a copy of its own, in which both are known. */
-static inline __attribute__((always_inline)) Four give(SolverFour *f, Four *a, Four *b, int rolls, int cornered) {
+/* `give` of rows.c for four rows; `rolls` and `cornered` are true if they are for any row of all. Each loop over it has
+   a copy of its own, in which both are known. */
+static inline __attribute__((always_inline)) Four give(SolverFour *f, int rolls, int cornered) {
     const LeverFour *l = W.lever_fours + (cornered ? f - W.fours : 0);
-    Four nx = get(f->nx), ny = get(f->ny), J = get(f->impulse), T = get(f->along), mass = get(f->mass);
-    Four x = less(a[0], b[0]), y = less(a[1], b[1]);
-    Four opens = sum(sum(by(x, nx), by(y, ny)), get(f->opens));
-    Four turn = sum(a[2], b[2]);
-    if (cornered) {
-        opens = sum(opens, sum(by(a[2], get(l->own)), by(b[2], get(l->others))));
-        turn = sum(by(a[2], get(l->own_slide)), by(b[2], get(l->others_slide)));
+    RollFour *r = W.roll_fours + (rolls ? f - W.fours : 0);
+    Four a[4], b[4];
+    for (int k = 0; k < 4; k++) {
+        a[k] = get(&f->a[k]->x);
+        b[k] = get(&f->b[k]->x);
     }
+    Four own = join(mix_last(a[0], a[1]), mix_last(a[2], a[3]));
+    Four others = join(mix_last(b[0], b[1]), mix_last(b[2], b[3]));
+    Four one = mix(less(a[0], b[0]), less(a[1], b[1])), other = mix(less(a[2], b[2]), less(a[3], b[3]));
+    Four x = join(one, other), y = join_last(one, other);
+    Four nx = get(f->nx), ny = get(f->ny), J = get(f->impulse), mass = get(f->mass);
+    Four opens = sum(sum(by(x, nx), by(y, ny)), get(f->opens));
+    if (cornered) opens = sum(opens, sum(by(own, get(l->own)), by(others, get(l->others))));
+    Four given = low(by(less(get(f->more), opens), mass), by(sum(opens, by(get(f->gives), J)), get(f->eases)));
+    given = high(given, by(less(get(f->parts), opens), mass));
+    Four normal = high(sum(J, given), all(0)), more = less(normal, J);
+    set(f->impulse, normal);
+    Four turn = cornered ? sum(by(own, get(l->own_slide)), by(others, get(l->others_slide))) : sum(own, others);
     Four slips = sum(less(by(x, ny), by(y, nx)), sum(turn, get(f->slips)));
-    Four given = low(by(less(get(f->more), opens), mass),
-                     by(wasm_f32x4_neg(sum(opens, by(get(f->gives), J))), get(f->eases)));
-    given = high(given, by(wasm_f32x4_neg(sum(opens, get(f->parts))), mass));
-    Four normal = high(sum(J, given), all(0));
-    if (cornered) slips = sum(slips, by(get(l->slips), less(normal, J)));
-    Four along = within(less(T, by(get(f->slide_mass), slips)), by(get(f->rough), normal));
-    Four more = less(normal, J), push = less(along, T);
+    if (cornered) slips = sum(slips, by(get(l->slips), more));
+    Four T = get(f->along), bound = by(get(f->rough), normal);
+    Four along = within(less(T, by(get(f->slide_mass), slips)), less(all(0), bound), bound), push = less(along, T);
+    set(f->along, along);
     Four change = high(wasm_f32x4_abs(by(more, get(f->light))), wasm_f32x4_abs(by(push, get(f->slide_light))));
     Four px = sum(by(more, nx), by(push, ny)), py = less(by(more, ny), by(push, nx));
     Four ra = push, rb = push;
@@ -87,39 +85,20 @@ static inline __attribute__((always_inline)) Four give(SolverFour *f, Four *a, F
         ra = sum(by(more, get(l->own)), by(push, get(l->own_slide)));
         rb = sum(by(more, get(l->others)), by(push, get(l->others_slide)));
     }
-    ra = by(ra, get(f->turn_a));
-    rb = by(rb, get(f->turn_b));
-    set(f->impulse, normal);
-    set(f->along, along);
     if (rolls) {
-        Four M = get(f->moment), turns = less(by(a[2], get(f->bend_a)), by(b[2], get(f->bend_b)));
-        turns = by(get(f->roll_mass), sum(turns, get(f->spin)));
-        Four moment = within(less(M, turns), by(get(f->arm), normal)), twist = less(moment, M);
-        change = high(change, wasm_f32x4_abs(by(twist, get(f->roll_light))));
-        ra = sum(ra, by(twist, get(f->twist_a)));
-        rb = less(rb, by(twist, get(f->twist_b)));
-        set(f->moment, moment);
+        Four M = get(r->moment), bend_a = get(r->bend_a), bend_b = get(r->bend_b);
+        Four turns = by(get(r->roll_mass), sum(less(by(own, bend_a), by(others, bend_b)), get(r->spin)));
+        Four hold = by(get(r->arm), normal);
+        Four moment = within(less(M, turns), less(all(0), hold), hold), twist = less(moment, M);
+        change = high(change, wasm_f32x4_abs(by(twist, get(r->roll_light))));
+        ra = sum(ra, by(twist, bend_a));
+        rb = less(rb, by(twist, bend_b));
+        set(r->moment, moment);
     }
-    a[0] = sum(a[0], by(get(f->mass_a), px));
-    a[1] = sum(a[1], by(get(f->mass_a), py));
-    a[2] = sum(a[2], ra);
-    b[0] = less(b[0], by(get(f->mass_b), px));
-    b[1] = less(b[1], by(get(f->mass_b), py));
-    b[2] = sum(b[2], rb);
-    return change;
-}
-
-/* Load the bodies of four rows, solve these, if `both` also the next four, which are their twins, and store them.
-   `way` is 1 or -1: forwards or backwards. */
-static inline __attribute__((always_inline)) Four give_and_store(SolverFour *f, int both, int way, LightBody *body,
-                                                                 int rolls, int cornered) {
-    Four a[4], b[4], change = all(0);
-    gather(body, f->a, a);
-    gather(body, f->b, b);
-    SolverFour *one = f + (both && way < 0);
-    for (int left = both; left >= 0; left--, one += way) change = high(change, give(one, a, b, rolls, cornered));
-    scatter(body, f->a, a);
-    scatter(body, f->b, b);
+    each(a, px, py, ra);
+    each(b, px, py, less(all(0), rb));
+    for (int k = 0; k < 4; k++) set(&f->a[k]->x, sum(get(&f->a[k]->x), by(get(f->a[k]->response), a[k])));
+    for (int k = 0; k < 4; k++) set(&f->b[k]->x, less(get(&f->b[k]->x), by(get(f->b[k]->response), b[k])));
     return change;
 }
 
@@ -142,14 +121,16 @@ static inline int hasten(int age, int rolls) {
     for (SolverFour *f = W.fours; f < W.fours + fours && age > 1; f++) {
         along = sum(along, went(f->impulse, f->swept, f->course, f->light));
         along = sum(along, went(f->along, f->slide_swept, f->slide_course, f->slide_light));
-        if (rolls) along = sum(along, went(f->moment, f->roll_swept, f->roll_course, f->roll_light));
+        RollFour *r = W.roll_fours + (rolls ? f - W.fours : 0);
+        if (rolls) along = sum(along, went(r->moment, r->roll_swept, r->roll_course, r->roll_light));
     }
     if (total(along) < 0) age = 1;
     Four go = all(age > 1 ? (age - 1) / (age + 2.0f) : 0);
     for (SolverFour *f = W.fours; f < W.fours + fours; f++) {
         go_on_by(f->impulse, f->swept, f->course, go, age > 0);
         go_on_by(f->along, f->slide_swept, f->slide_course, go, age > 0);
-        if (rolls) go_on_by(f->moment, f->roll_swept, f->roll_course, go, age > 0);
+        RollFour *r = W.roll_fours + (rolls ? f - W.fours : 0);
+        if (rolls) go_on_by(r->moment, r->roll_swept, r->roll_course, go, age > 0);
     }
     for (LightBody *b = W.light_bodies; b < W.light_bodies + bodies; b++)
         go_on_by(&b->x, &b->swept[0], &b->course[0], go, age > 0);
@@ -158,18 +139,13 @@ static inline int hasten(int age, int rolls) {
 
 /* `sweep_rows` of rows.c. */
 static inline double sweep(int sweeps, int plain, double accurate, double most, int rolls, int cornered) {
-    LightBody *const body = W.light_bodies;
     double worst = 0;
     int age = 0;
     for (int n = 0; n < sweeps; n++) {
         Four change = all(0);
         if (n >= plain && (n - plain) % 2 == 0) age = hasten(n == plain ? 0 : age, rolls);
-        int way = (sweeps - n) % 2 ? 1 : -1, loads = fours - twins;
-        for (int k = 0; k < loads; k++) {
-            int load = way > 0 ? k : loads - 1 - k, both = cornered && load < twins;
-            SolverFour *f = W.fours + load + (both ? load : twins);
-            change = high(change, give_and_store(f, both, way, body, rolls, cornered));
-        }
+        for (int k = 0; k < fours; k++)
+            change = high(change, give(W.fours + ((sweeps - n) % 2 ? k : fours - 1 - k), rolls, cornered));
         worst = greatest(change);
         W.sweep_count++;
         if (worst <= accurate) return worst;
@@ -180,60 +156,42 @@ static inline double sweep(int sweeps, int plain, double accurate, double most, 
 
 static inline float bounded(double a) { return (float)MIN(a, ANY); }
 
-/* Give the rows of all colours their places in fours, `each` fours for four of them, from `fours` on. */
-static void place_colours(int *begin, int each) {
-    for (int k = 0; k <= COLOURS; k++) {
-        int many = begin[k];
-        begin[k] = 4 * fours;
-        fours += each * (k < COLOURS ? (many + 3) / 4 : many);
-    }
-}
-
 /* Colour the rows and copy them into fours. Return whether there is room for them; set whether any has rolling friction. */
 static int set_fours(int rows, int cornered, int *rolls) {
-    int single[COLOURS + 1] = {0}, twin[COLOURS + 1] = {0};
+    int place[COLOURS + 1] = {0};
     for (int n = 0; n < rows; n++) {
         SolverRow *r = W.rows + n;
         SolverBody *a = W.solver_bodies + r->a, *b = W.solver_bodies + r->b;
         *rolls |= r->arm > 0;
-        r->twin = cornered && n > 0 && r[-1].a == r->a && r[-1].b == r->b && !r[-1].twin && r[-1].colour < COLOURS;
-        if (r->twin) {
-            single[r[-1].colour]--;
-            twin[r[-1].colour]++;
-            continue;
-        }
         int used = r->b ? a->used | b->used : a->used, colour = 0;
         while (colour < COLOURS && used >> colour & 1) colour++;
         a->used |= 1 << colour;
         b->used |= 1 << colour;
-        r->colour = colour;
-        single[colour]++;
+        r->four = colour;
+        place[colour]++;
     }
     fours = 0;
-    place_colours(twin, 2);
-    twins = fours / 2;
-    place_colours(single, 1);
+    for (int k = 0; k <= COLOURS; k++) {
+        int many = place[k];
+        place[k] = 4 * fours;
+        fours += k < COLOURS ? (many + 3) / 4 : many;
+    }
     if (fours > W.four_room) return 0;
-    for (int n = 0; n < fours; n++) W.fours[n] = (SolverFour){.a = {0}};
+    /* Places without a row change nothing of the first body. */
+    LightBody *none = W.light_bodies;
+    for (int n = 0; n < fours; n++) W.fours[n] = (SolverFour){.a = {none, none, none, none}, .b = {none, none, none, none}};
+    for (int n = 0; n < fours && *rolls; n++) W.roll_fours[n] = (RollFour){.arm = {0}};
     for (int n = 0; n < fours && cornered; n++) W.lever_fours[n] = (LeverFour){.own = {0}};
     for (int n = 0; n < rows; n++) {
         SolverRow *r = W.rows + n;
         const SolverBody *a = W.solver_bodies + r->a, *b = W.solver_bodies + r->b;
-        int has_twin = n + 1 < rows && r[1].twin;
-        if (r->twin) r->four = r[-1].four + 4;
-        else if (has_twin) {
-            int *at = twin + r->colour;
-            r->four = *at;
-            *at += *at % 4 < 3 ? 1 : 5;
-        } else {
-            int *at = single + r->colour;
-            r->four = *at;
-            *at += r->colour < COLOURS ? 1 : 4;
-        }
+        int *next = place + r->four, alone = r->four == COLOURS;
+        r->four = *next;
+        *next += alone ? 4 : 1;
         int k = r->four % 4;
         SolverFour *f = W.fours + r->four / 4;
-        f->a[k] = r->a;
-        f->b[k] = r->b;
+        f->a[k] = W.light_bodies + r->a;
+        f->b[k] = W.light_bodies + r->b;
         f->nx[k] = (float)r->normal[0];
         f->ny[k] = (float)r->normal[1];
         f->opens[k] = bounded(r->free[0]);
@@ -243,14 +201,10 @@ static int set_fours(int rows, int cornered, int *rolls) {
         f->light[k] = (float)r->light[0];
         f->slide_light[k] = (float)r->light[1];
         f->gives[k] = (float)r->gives;
-        f->eases[k] = (float)r->eases;
+        f->eases[k] = -(float)r->eases;
         f->more[k] = bounded(r->more);
-        f->parts[k] = bounded(r->parts);
+        f->parts[k] = -bounded(r->parts);
         f->rough[k] = bounded(r->rough);
-        f->mass_a[k] = (float)a->mass;
-        f->mass_b[k] = (float)b->mass;
-        f->turn_a[k] = (float)a->turn;
-        f->turn_b[k] = (float)b->turn;
         f->impulse[k] = (float)r->impulse[0];
         f->along[k] = (float)r->impulse[1];
         if (cornered) {
@@ -263,15 +217,14 @@ static int set_fours(int rows, int cornered, int *rolls) {
             l->slips[k] = (float)from->slips;
         }
         if (!*rolls) continue;
-        f->arm[k] = (float)r->arm;
-        f->spin[k] = (float)r->spin;
-        f->twist_a[k] = (float)a->twist;
-        f->twist_b[k] = (float)b->twist;
-        f->bend_a[k] = (float)a->bend;
-        f->bend_b[k] = (float)b->bend;
-        f->roll_mass[k] = (float)r->roll_mass;
-        f->roll_light[k] = (float)r->roll_light;
-        f->moment[k] = (float)r->moment;
+        RollFour *o = W.roll_fours + r->four / 4;
+        o->arm[k] = (float)r->arm;
+        o->spin[k] = (float)r->spin;
+        o->bend_a[k] = (float)a->bend;
+        o->bend_b[k] = (float)b->bend;
+        o->roll_mass[k] = (float)r->roll_mass;
+        o->roll_light[k] = (float)r->roll_light;
+        o->moment[k] = (float)r->moment;
     }
     return 1;
 }
@@ -284,7 +237,9 @@ double sweep_fours(int rows, int all_bodies, int cornered, int sweeps, int plain
     for (int n = 0; n < bodies; n++) {
         SolverBody *b = W.solver_bodies + n;
         b->used = 0;
-        W.light_bodies[n] = (LightBody){.x = (float)b->x, .y = (float)b->y, .rim = (float)b->rim};
+        float mass = (float)b->mass;
+        W.light_bodies[n] = (LightBody){.x = (float)b->x, .y = (float)b->y, .rim = (float)b->rim,
+                                        .response = {mass, mass, (float)b->turn}};
     }
     if (!set_fours(rows, cornered, &rolls)) return INFINITY;
     double worst;
@@ -293,7 +248,7 @@ double sweep_fours(int rows, int all_bodies, int cornered, int sweeps, int plain
     for (SolverRow *r = W.rows; r < W.rows + rows && worst < INFINITY; r++) {
         const SolverFour *f = W.fours + r->four / 4;
         double normal = f->impulse[r->four % 4], bound = r->rough * normal, arm = r->arm * normal;
-        double along = f->along[r->four % 4], moment = f->moment[r->four % 4];
+        double along = f->along[r->four % 4], moment = rolls ? W.roll_fours[r->four / 4].moment[r->four % 4] : 0;
         r->impulse[0] = normal;
         r->impulse[1] = fabs(along) > NOTHING * normal ? MIN(MAX(along, -bound), bound) : 0;
         r->moment = fabs(moment) > NOTHING * arm ? MIN(MAX(moment, -arm), arm) : 0;

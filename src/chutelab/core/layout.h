@@ -337,7 +337,7 @@ typedef struct {
     double mass;            /* 1/kg */
     double turn, twist;     /* 1/kg, 1/(kg m); response of the rim to an impulse at it, and to a moment */
     double bend;            /* 1/m; 1 / radius */
-    int disk, used;         /* whose; which colours its rows have */
+    int disk, used;         /* whose; which colours its rows have, see fours.c */
 } SolverBody;
 
 /* A contact for the sweeps: what they change, and what it asks for. */
@@ -356,30 +356,33 @@ typedef struct {
     double change;          /* m/s; change of its slip by the last sweep */
     int a, b;               /* bodies */
     int from;               /* number of its contact in the list */
-    int colour, four;       /* see `SolverFour`; its place among their numbers */
-    int twin;               /* whether the row before is another place of the same two, see fours.c */
+    int four;               /* its place among the numbers of `SolverFour` */
 } SolverRow;
 
 /* Levers of a row with corners or a hinge: change of the rim of both bodies by its impulses, in their radii; and change
    of the slip by its normal impulse, 1/kg. */
 typedef struct { double own[2], others[2], slips, pad; } RowLever;
 
-/* Four rows for sweeps in single precision. Fields have the names of `SolverRow`, except those of x and y, and of normal
-   and slip. */
+/* A body of the sweeps in single precision, with 1/kg of x, y and rim. */
+typedef struct { float x, y, rim, pad, swept[4], course[4], response[4]; } LightBody;
+
+/* Four rows for these sweeps. Fields have the names of `SolverRow`, except those of x and y, and of normal and slip;
+   `eases` and `parts` have the opposite sign. */
 typedef struct {
-    int a[4], b[4];
+    LightBody *a[4], *b[4];
     float nx[4], ny[4], opens[4], slips[4], mass[4], slide_mass[4], light[4], slide_light[4];
-    float gives[4], eases[4], more[4], parts[4], rough[4], mass_a[4], mass_b[4], turn_a[4], turn_b[4];
+    float gives[4], eases[4], more[4], parts[4], rough[4];
     float impulse[4], along[4], swept[4], course[4], slide_swept[4], slide_course[4];
-    float arm[4], spin[4], roll_mass[4], roll_light[4], twist_a[4], twist_b[4], bend_a[4], bend_b[4];
-    float moment[4], roll_swept[4], roll_course[4];
 } SolverFour;
+
+/* The rolling friction of four rows. */
+typedef struct {
+    float arm[4], spin[4], roll_mass[4], roll_light[4], bend_a[4], bend_b[4];
+    float moment[4], roll_swept[4], roll_course[4];
+} RollFour;
 
 /* The levers of four rows. */
 typedef struct { float own[4], own_slide[4], others[4], others_slide[4], slips[4]; } LeverFour;
-
-/* What they change of a body. */
-typedef struct { float x, y, rim, pad, swept[4], course[4]; } LightBody;
 
 /* inner: in the exact engine, whether it lies within a ride round a circle; plus 2 if a track of a family comes there round
    a circle from the knot before. */
@@ -429,6 +432,7 @@ typedef struct {
     RowLever *levers;    /* (contacts + 3 movers) ... levers of those of particles with corners, and of hinges */
     SolverBody *solver_bodies; /* (disks + 1 + movers) ... and their disks and hinges */
     SolverFour *fours;   /* (four_room) the same in single precision */
+    RollFour *roll_fours;   /* (four_room) ... their rolling friction */
     LeverFour *lever_fours; /* (four_room) ... and their levers */
     LightBody *light_bodies; /* (disks + 1 + movers) */
     Frozen *frozen;      /* (2 contacts) contacts of sleepers */

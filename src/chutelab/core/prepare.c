@@ -290,6 +290,7 @@ static void make_contact_room(int room) {
     RESERVE(W.levers, W.outline_count || W.mover_count ? room + 3.0 * W.mover_count : 0);
     W.four_room = W.interact ? room / 4 : 0;
     RESERVE(W.fours, W.four_room);
+    RESERVE(W.roll_fours, W.four_room);
     RESERVE(W.lever_fours, W.outline_count || W.mover_count ? W.four_room : 0);
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
     if (!has_room() || !W.frozen_count) return;

@@ -15,7 +15,7 @@ from chutelab.scene import from_dict, load
 from chutelab.scene.look import JOINTS, MOTIONS
 from chutelab.util.words import words
 from live.browser import DONE, Hand, axe, spot
-from shared import call
+from shared import call, some
 
 expect = pytest.importorskip("playwright.sync_api").expect
 
@@ -946,6 +946,21 @@ def test_dominoes_run_whole_and_a_box_is_made_turned_caught_and_saved(shown, tmp
     assert own < -0.5
     page.evaluate("chutelab.lab.restart()")
     assert same_bits(page, tmp_path, 0.9) > 100
+
+
+@pytest.mark.parametrize("name", some(["perpendicular", "stream"]))
+def test_a_box_is_put_into_a_machine_whose_belt_grips(shown, name, tmp_path):
+    """Adhesion carries the balls; the box meets them, and the belt, as all else."""
+    page = shown(name)
+    page.click("#tool-add")
+    page.focus("#part-box")
+    page.keyboard.press("Enter")
+    expect(page.locator("#chosen h2")).to_have_text("Box 1")
+    expect(page.locator("#fault")).to_be_hidden()
+    assert page.evaluate(WHOLE) == "done"
+    assert page.evaluate("chutelab.lab.recording.breaches") == []
+    assert given(page).get("incoming", {}).get("friction", "adhesion") == "adhesion"
+    assert same_bits(page, tmp_path, 0.9) > 2
 
 
 ROLLS = ["--set", "particle.domino.rolling_friction=0.1"]

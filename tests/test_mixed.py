@@ -652,3 +652,59 @@ def streamed(seed):
 def test_streams_of_several_shapes_keep_the_laws(seed):
     """None gets into another, nor through a surface, and the ledger closes."""
     sound(chutelab.simulate(streamed(seed), engine="contact"))
+
+
+GRIPS = {"speed": 1.5, "pulley_radius": 0.1}
+"""An incoming belt that carries balls by adhesion, its surface at y = 0.1 m."""
+
+
+@pytest.mark.parametrize("drop", [0.02, 0.2])
+def test_a_box_that_falls_on_a_belt_with_adhesion_is_gripped(drop):
+    """Adhesion ends at separation; else the belt's friction is infinite, so the box has its speed.
+
+    It lies flat if its normal impulse, at one corner, outweighs the friction: v h <= u w. Else it
+    tips about the rear corner, which gets the speed of the belt.
+    """
+    v, u = GRIPS["speed"], sqrt(2.0 * G * drop)
+    run = sound(chutelab.simulate({
+        "incoming": {**GRIPS, "length": 3.0, "restitution": 0.0},
+        "particle": [ROUND, {**BOX, "name": "box"}],
+        "stream": [{"particle": "ball"},
+                   {"particle": "box", "at": [-2.0, 0.1 + 0.5 * H + drop], "velocity": [0.0, 0.0],
+                    "interact": True}],
+        "run": {"until": u / G + 1e-7, "dt": 1e-3},
+    }, engine="contact"))  # fmt: skip
+    end = run.ends()[1][1]
+    (x, y), spin = end["velocity"], end["omega"]
+    if v * H <= u * W:
+        assert (x, y, spin) == pytest.approx((v, 0.0, 0.0), abs=1e-5)
+    else:
+        rear = x + 0.5 * spin * H, y - 0.5 * spin * W
+        assert rear == pytest.approx((v, 0.0), abs=1e-5)
+        assert spin > 0.0
+
+
+def gripped(seed):
+    """Draw balls that a belt carries by adhesion, and boxes that fall on it and among them."""
+    random = np.random.default_rng(seed)
+    draw, one_of = random.uniform, random.choice
+    meets = {"interact": True, "restitution": draw(0.0, 0.8), "friction": draw(0.0, 0.6)}
+    return {
+        "incoming": {"speed": draw(0.3, 3.0), "pulley_radius": draw(0.05, 0.1), "length": 0.6},
+        "plate": {"distance": 0.5, "restitution": 0.3, "friction": 0.3},
+        "outgoing": {"drop": 0.5, "length": 3.0},
+        "particle": [{**ROUND, "radius": 0.0063, "mass": 0.008},
+                     {**BOX, "name": "box", "size": list(draw(0.01, 0.05, 2)), "mass": 0.05}],
+        "stream": [
+            {"particle": "ball", "count": int(one_of([1, 20, 60])), "rate": 30.0, **meets},
+            {"particle": "box", "count": int(one_of([1, 3, 6])), "rate": 5.0,
+             "at": [draw(-0.4, 0.5), draw(0.25, 0.6)], "velocity": [0.0, draw(-1.0, 0.0)],
+             "omega": draw(-5.0, 5.0), **meets},
+        ],
+        "run": {"until": 2.0},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", seeds(4, 100))
+def test_random_boxes_among_balls_that_a_belt_carries_keep_the_laws(seed):
+    sound(chutelab.simulate(gripped(seed), engine="contact"))

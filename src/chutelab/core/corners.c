@@ -16,6 +16,8 @@
 #define STILL 5e-4
 /* How many times the turn of a corner's path that an arc gives in a step still counts as due to the arc. */
 #define BENT 1.01
+/* Infinite friction, by adhesion, as a number: what two places can hold is compared, and infinity less infinity is none. */
+#define GRIPS 1e6
 /* Number of pairs whose places are remembered during an impact and those that follow from it. */
 #define KNOWN 8
 
@@ -115,7 +117,8 @@ RARELY void describe_touch(Contact *c, int i, int j, const Touch *t) {
     const Pair *pair = j < 0 ? surface_pair(a, -1 - j) : pair_of(a->kind, b->kind);
     double rotation[2], mass = a->inv_mass, turn = a->inv_inertia;
     *c = (Contact){.nx = t->nx, .ny = t->ny, .gap = t->gap, .most = INFINITY, .share = 1, .i = i, .j = j, .cornered = 1,
-                   .owner = W.owner_count, .rest = pair->restitution, .falls = pair->falls, .friction = pair->friction};
+                   .owner = W.owner_count, .rest = pair->restitution, .falls = pair->falls,
+                   .friction = MIN(pair->friction, GRIPS)};
     c->two = j >= 0 && b->mode == FREE;
     take_levers(c, t, rotation);
     note_look(c, t->many);

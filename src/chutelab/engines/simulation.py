@@ -269,9 +269,10 @@ def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
         if kind.outline and kind.rolling_friction:
             key = f"{scene.head('particle', n)}.rolling_friction"
             yield key, kind.rolling_friction, "0 with boxes and polygons: they do not roll"
-    belt = scene.incoming
-    if belt is not None and belt.friction == "adhesion":
-        yield "incoming.friction", belt.friction, f"a Coulomb coefficient with {why}"
+    carried = set(machine.releases.kind[machine.releases.carried])
+    if any(scene.particles[kind].outline for kind in carried):
+        allowed = f"a Coulomb coefficient if it carries {why}"
+        yield "incoming.friction", "adhesion", allowed
     for n, pair in enumerate(scene.pair):
         if pull := pair.clings:
             allowed = "0 with boxes and polygons: it pulls at the one point where round ones touch"

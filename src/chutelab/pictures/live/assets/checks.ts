@@ -262,7 +262,7 @@ function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
 
 /** Yields features that the contact engine lacks for boxes and polygons. */
 function* corneredConflicts(scene: Scene, given: Given): Generator<Wrong> {
-  const { particles, incoming, pair } = scene, text = "cornered";
+  const { particles, pair } = scene, text = "cornered";
   if (!particles.some(({ outline }) => outline.length)) return;
   for (const [n, { outline, rolling_friction: rolls, points }] of particles.entries()) {
     if (outline.length && rolls) yield [pathOf(given, "particle", n, "rolling_friction"), rolls, text];
@@ -274,7 +274,6 @@ function* corneredConflicts(scene: Scene, given: Given): Generator<Wrong> {
       yield [pathOf(given, "stream", n, "width"), particle, "other-shape"];
     }
   }
-  if (incoming?.friction === "adhesion") yield ["incoming.friction", "adhesion", "cornered-grip"];
   const clings = pair.findIndex(clinging);
   if (clings >= 0) yield [`pair[${clings}].${clinging(pair[clings])}`, undefined, text];
 }

@@ -27,7 +27,8 @@ const LOOKS = 2 ** 31 - 1;
  * Has the core draw the releases of a scene whose surfaces it has just laid, and the radii of the
  * particles.
  * @param names of the surfaces
- * @throws {Fault} if a box has no room for all, or a particle would start inside a surface
+ * @throws {Fault} if a box has no room for all, a particle would start inside a surface, or
+ *   adhesion would carry one with corners
  */
 export function draw(scene: Scene, names: string[]): { releases: Release[], radius: number[] } {
   const core = memory(), { Refused, Status } = core.layout.enums, { streams, kinds } = scene;
@@ -43,6 +44,9 @@ export function draw(scene: Scene, names: string[]): { releases: Release[], radi
   let at = core.get("starts", "Drawing") >> 3;
   streams.forEach((one, stream) => {
     const common = { carried: ints[carried + stream] !== 0, stream, kind: kinds[stream] };
+    if (common.carried && scene.particles[common.kind].outline.length) {
+      throw new Fault("incoming.friction", "adhesion", "cornered-grip");
+    }
     for (let i = 0; i < one.count; i += 1, at += core.layout.structs.Start.size >> 3) {
       releases.push({
         t: doubles[at], x: doubles[at + 1], y: doubles[at + 2], vx: doubles[at + 3],

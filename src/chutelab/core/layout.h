@@ -157,6 +157,8 @@ typedef struct {
     double cos_half;        /* arc: cosine of half its angle */
     double end[4];          /* segment and arc: both ends, x and y */
     double crown[4];        /* ... and unit vectors to the middle of that half of their rim that belongs to its left side */
+    double hollows[4];      /* of a segment: cotangents of the angles to the pieces that are next to it at its ends, on its
+                               left and right, ... */
     double speed;           /* [in] m/s along the tangent; round a circle or arc clockwise */
     double opens, closes;   /* [in] s; it exists from the one to the other */
     int shape;              /* [in] a full arc becomes a circle */
@@ -170,7 +172,7 @@ typedef struct {
     int there;              /* enum There: whether it exists in this step */
     int ignored;            /* whether it is a gate that has closed on particles, which ignore it */
     int mover;              /* row of `movers` if it moves, else -1 */
-    int hollows[2];         /* of a segment: sides to which another segment continues at its ends: 1 left, 2 right */
+    int beside[4];          /* ... and these pieces, or -1 */
     double box[4];          /* m; left, bottom, right, top; of all that it sweeps in this step */
     double swept[4];        /* m; the same for the whole run */
     double posed;           /* s; of a moving surface: time of the position above ... */

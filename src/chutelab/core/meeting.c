@@ -224,7 +224,7 @@ double meet_corners(int i, int j, double from, double until, double most, double
     double bends = turn * (2 * most + 4 * turn * MAX(W.disks[i].radius, both ? W.disks[j].radius : 0));
     if (fastest > 0) least_stride = MIN(least_stride, TURNS / fastest);
     if (are_apart(&a, &b, most * span + near)) return INFINITY;
-    closed = both && overlap(&a, &b);
+    closed = (both || on_segment) && overlap(&a, &b);
     if (closed) deep = MAX(a.clear, b.clear);
     /* On something round all corners are one candidate: when one leaves, the next may arrive. */
     int rolls = b.round >= 0 && span * (fabs(W.disks[i].spin) + (j < 0 ? 0 : fabs(W.disks[j].spin))) > ROLLS;
@@ -270,8 +270,9 @@ double meet_corners(int i, int j, double from, double until, double most, double
             /* It closes fast enough at the end of the stride, which is soon enough. */
             if (both && before <= 0 && gap[c] < before && closes > soft && closes > left_by_corners(i, j, gap[c], t))
                 first = MIN(first, t);
-            int at_tip = both && (on[c] != edge || on[c] & (on[c] - 1)) && MIN(before, gap[c]) <= most * (t - last);
-            passes |= at_tip;
+            int is_near = MIN(before, gap[c]) <= most * (t - last), is_end = on_segment && c >= a.count;
+            int at_tip = both && (on[c] != edge || on[c] & (on[c] - 1)) && is_near;
+            passes |= at_tip || (is_end && is_near);
             double end = t, least = gap[c];
             /* It may have come in by one edge and gone out by the next. */
             if (at_tip && before > 0 && least > 0 && closes < 0 && before + least <= most * (t - last))
@@ -283,8 +284,8 @@ double meet_corners(int i, int j, double from, double until, double most, double
             Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
             if (closes_faster(i, j, &a3, &b3, then, TOUCHING * small, soft)) first = then;
         }
-        /* A tip that passes through a tip, from one edge beyond the next, is inside nothing after it, but edges cross then,
-           also before a corner enters. */
+        /* A tip that passes through a tip, from one edge beyond the next, or through an end of a segment is inside nothing
+           after it, but edges cross then, also before a corner enters. */
         if (!passes || most * (t - checked) < near) continue;
         double end = MIN(t, first);
         a2 = shape_of(i, end);

@@ -223,7 +223,7 @@ static void find_crown(int k, int n, double r) {
     at_end(s, n, place, out);
     crown[0] = -sense * out[1];
     crown[1] = sense * out[0];
-    s->hollows[n] = 0;
+    s->beside[2 * n] = s->beside[2 * n + 1] = -1;
     for (int row = first_near(2 * k + n, r, &last); row < W.end_count && rank(W.ends[row]) <= last; row++) {
         const Surface *next = W.surfaces + W.ends[row] / 2;
         int end = W.ends[row] % 2;
@@ -231,7 +231,12 @@ static void find_crown(int k, int n, double r) {
         if (W.ends[row] == 2 * k + n || there[0] != place[0] || there[1] != place[1]) continue;
         if (!move_alike(s, next) || next->there == ABSENT) continue;
         double left = back[0] * s->ty - back[1] * s->tx;
-        if (s->shape == SEGMENT && fabs(left) > ALIKE) s->hollows[n] |= left > 0 ? 1 : 2;
+        int corner = 2 * n + (left < 0);
+        double narrow = (out[0] * back[0] + out[1] * back[1]) / fabs(left);
+        if (s->shape == SEGMENT && fabs(left) > ALIKE && (s->beside[corner] < 0 || narrow > s->hollows[corner])) {
+            s->hollows[corner] = narrow;
+            s->beside[corner] = W.ends[row] / 2;
+        }
         double bends = curl_of(next, end) - curl_of(s, n);
         double turn = atan2(out[0] * back[1] - out[1] * back[0], out[0] * back[0] + out[1] * back[1]);
         if (fabs(turn) <= ALIKE) {

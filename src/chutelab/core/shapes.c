@@ -199,7 +199,10 @@ int are_apart(Shape *a, Shape *b, double by) {
         low = MIN(low, off);
         high = MAX(high, off);
     }
-    if (b->round < 0) return low > by || high < -by;
+    if (b->round < 0) {
+        b->clear = MAX(low, -high);
+        return b->clear > by;
+    }
     return by < b->radius && high < square(b->radius - by);
 }
 
@@ -247,22 +250,6 @@ void fill_in(const Shape *a, const Shape *b, Touch *t) {
     t->ny = n[1];
 }
 
-/* The side of a segment that a corner is on: usually its own. If the line from the corner to the centre, which is inside
-   the particle, crosses the segment, the corner has passed through, and its side is that of the centre. This also holds
-   up to `near` beyond an end at which another segment continues to that side, since a corner that overlaps two walls is
-   beyond the end of each; or at which the surface continues smoothly. */
-int side_of(const Shape *a, const Surface *s, int corner, double near) {
-    double x = a->p[corner][0] - s->x, y = a->p[corner][1] - s->y, u = a->x - s->x, v = a->y - s->y;
-    double off = y * s->tx - x * s->ty, mid = v * s->tx - u * s->ty, both = fabs(off) + fabs(mid);
-    int own = off >= 0 ? 1 : -1, centre = mid >= 0 ? 1 : -1;
-    if (own == centre) return own;
-    double cut = ((x * s->tx + y * s->ty) * fabs(mid) + (u * s->tx + v * s->ty) * fabs(off)) / both;
-    int hollow = centre > 0 ? 1 : 2, sunk = fabs(off) <= near;
-    double low = sunk && ((s->hollows[0] & hollow) || mate_of(s, 0) >= 0) ? -near : 0;
-    double high = sunk && ((s->hollows[1] & hollow) || mate_of(s, 1) >= 0) ? near : 0;
-    return cut >= low && cut <= s->length + high ? centre : own;
-}
-
 /* Whether a point of a shape is on the inside of an arc: its own position decides, unless the line from it to the centre,
    which is inside the shape, crosses the arc once. Outside the circle are both where a shape lies over the opening: then
    the line may enter the circle through the arc, and leave it through the opening. */
@@ -283,13 +270,39 @@ static int is_inside(const Shape *a, const Surface *s, double px, double py) {
     return result;
 }
 
-/* How far beyond an end of a segment a corner on one of its sides may be and still be on the segment: only rounding, unless
-   the segment continues smoothly, or the particle is on that side and another segment continues to it: there a corner beyond
-   the end is through that one. */
-static double past_end(const Shape *a, const Surface *s, int end, int side, double near) {
-    double mid = (a->y - s->y) * s->tx - (a->x - s->x) * s->ty;
-    int hollow = mid * side > 0 && (s->hollows[end] & (side > 0 ? 1 : 2));
-    return mate_of(s, end) < 0 && !hollow ? ROUNDED * near : near;
+/* Whether a corner has passed through a piece: the line from it to the centre, which is inside the particle, crosses the
+   piece. */
+static int has_passed(const Shape *a, const Surface *s, const double *q) {
+    double x = q[0] - s->x, y = q[1] - s->y, u = a->x - s->x, v = a->y - s->y;
+    if (s->shape != SEGMENT) return is_inside(a, s, q[0], q[1]) != (x * x + y * y <= square(s->radius));
+    double off = y * s->tx - x * s->ty, mid = v * s->tx - u * s->ty, both = fabs(off) + fabs(mid);
+    double cut = (x * s->tx + y * s->ty) * fabs(mid) + (u * s->tx + v * s->ty) * fabs(off);
+    return (off >= 0) != (mid >= 0) && cut >= 0 && cut <= s->length * both;
+}
+
+/* How far beyond an end of a segment a corner on one of its sides, 1 or -1, may be and still be on the segment: only
+   rounding, unless the segment continues smoothly there; or without bound, if the corner has passed through one of two pieces
+   between which the centre is: then it is beyond the end of either. */
+static double past_end(const Shape *a, const Surface *s, const double *q, int end, int side, double near) {
+    double x = a->x - s->end[2 * end], y = a->y - s->end[2 * end + 1], along = x * s->tx + y * s->ty;
+    double off = side * (y * s->tx - x * s->ty);
+    int row = 2 * end + (side < 0), next = s->beside[row];
+    if (mate_of(s, end) >= 0) return near;
+    if (next < 0 || off <= 0 || (end ? -along : along) <= off * s->hollows[row]) return ROUNDED * near;
+    return has_passed(a, s, q) || has_passed(a, surface_at(next, s->posed), q) ? INFINITY : ROUNDED * near;
+}
+
+/* The side of a segment that a corner is on: its own, or that of the centre if the corner has passed through the segment,
+   also a little beyond an end, see `past_end`. */
+int side_of(const Shape *a, const Surface *s, int corner, double near) {
+    const double *q = a->p[corner];
+    double x = q[0] - s->x, y = q[1] - s->y, u = a->x - s->x, v = a->y - s->y;
+    double off = y * s->tx - x * s->ty, mid = v * s->tx - u * s->ty, both = fabs(off) + fabs(mid);
+    int own = off >= 0 ? 1 : -1, centre = mid >= 0 ? 1 : -1;
+    if (own == centre) return own;
+    double cut = ((x * s->tx + y * s->ty) * fabs(mid) + (u * s->tx + v * s->ty) * fabs(off)) / both;
+    double past = MAX(-cut, cut - s->length);
+    return past <= 0 || past <= past_end(a, s, q, cut > 0, centre, near) ? centre : own;
 }
 
 /* Find what a candidate is on, and fill in its place; return 0 if it doesn't touch there. */
@@ -301,7 +314,8 @@ int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
             double along = (q[0] - b->s->x) * b->s->tx + (q[1] - b->s->y) * b->s->ty;
             t->on = side_of(a, b->s, t->which, near);
             fill_in(a, b, t);
-            return along >= -past_end(a, b->s, 0, t->on, near) && along <= b->s->length + past_end(a, b->s, 1, t->on, near);
+            double past = MAX(-along, along - b->s->length);
+            return past <= 0 || past <= past_end(a, b->s, q, along > 0, t->on, near);
         }
         if (b->s) {
             double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);

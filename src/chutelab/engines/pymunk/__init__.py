@@ -6,7 +6,7 @@ It shares only the machine and the recorder with the other engines: an independe
 - `world`: the surfaces as a `pymunk.Space`; where a path meets them; rides by adhesion.
 - `lone`: one particle whose steps end at its contacts.
 - `shared`: all particles in one Space, in steps of equal length.
-- `moving`: moving surfaces; strings, rods, springs and pins; rolling friction.
+- `moving`: moving surfaces; strings, rods, springs and pins; rolling friction; air drag.
 - `shapes`: bodies and shapes, chains for arcs, and values for Chipmunk's contacts.
 """
 

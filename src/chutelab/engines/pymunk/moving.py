@@ -1,4 +1,4 @@
-"""Moving surfaces, joints and rolling friction, in addition to Chipmunk's contacts.
+"""Moving surfaces, joints, rolling friction and air drag, in addition to Chipmunk's contacts.
 
 Surfaces with a prescribed motion are kinematic bodies; hinged ones hang on joints.
 
@@ -19,7 +19,7 @@ from pymunk import Vec2d
 
 from chutelab.engines.pymunk.faces import Face
 from chutelab.engines.pymunk.world import DIGITS, World
-from chutelab.machine import Joint, Machine, Mover
+from chutelab.machine import VISCOSITY, Joint, Machine, Mover
 from chutelab.util.arrays import Bools, Floats, Ints
 
 COMES_BACK: Final = 0.02
@@ -433,3 +433,12 @@ class Rolling:
         one, other, most = one[rolls], other[rolls], most[rolls]
         change = (turning[1, one] - turning[1, other]) / ease[rolls]
         self.couples = one, other, np.clip(np.array(held)[rolls] - change, -most, most)
+
+
+def relief(machine: Machine, speed: Floats) -> Any:
+    """Return deceleration by air over speed, 1/s (Schiller and Naumann, 1933)."""
+    reynolds = 2.0 * machine.broad * speed * machine.air / VISCOSITY
+    coefficient = np.where(
+        reynolds < 1000.0, 24.0 * (1.0 + 0.15 * reynolds**0.687), 0.44 * reynolds
+    )
+    return coefficient * np.pi * machine.broad * VISCOSITY / (4.0 * machine.particle.mass)

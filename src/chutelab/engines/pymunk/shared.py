@@ -27,10 +27,10 @@ import pymunk
 from pymunk import Vec2d, batch
 
 from chutelab.engines.pymunk.faces import Bend, Flight, no_rims
-from chutelab.engines.pymunk.moving import Moving, Rolling, Ties
+from chutelab.engines.pymunk.moving import Moving, Rolling, Ties, relief
 from chutelab.engines.pymunk.shapes import Shapes
 from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Carriage, World, balance
-from chutelab.machine import SWING, VISCOSITY, Machine
+from chutelab.machine import SWING, Machine
 from chutelab.results.loads import Bins
 from chutelab.results.recorder import EnoughError, Recorder, Tracks
 from chutelab.results.rows import REASONS, Kind
@@ -52,10 +52,6 @@ settled."""
 
 TAKES = 0.05
 """Greatest share of its speed that drag takes from a particle in a step."""
-
-ROUNDING = float(np.finfo(float).eps)
-"""An impulse p changes the velocity of a mass m with an error of this share of p/m, and the energy
-with one of this share of p²/m."""
 
 _BODY = (
     batch.BodyFields.BODY_ID
@@ -95,7 +91,7 @@ class Shared:
         self.radius = np.zeros(rows)
         self.light = np.zeros(rows)  # 1/kg; 0 of a surface
         self.light[:count] = 1.0 / machine.particle.mass
-        self.radius[:count], self.broad = p.radius, machine.broad
+        self.radius[:count] = p.radius
         self.shapes = Shapes(machine, world)
         self.bodies, self.corners = self.shapes.bodies, self.shapes.corners
         # One value for all, or one each.
@@ -116,7 +112,7 @@ class Shared:
         span = machine.end_time - self.begin
         longest = machine.step_of("pymunk")
         if machine.air:
-            longest = min(longest, TAKES / self._relief(np.hypot(*starts.velocity.T)).max())
+            longest = min(longest, TAKES / relief(machine, np.hypot(*starts.velocity.T)).max())
         self.most = ceil(span / longest - 1e-9)
         self.h, self.steps, self.clock = span / max(self.most, 1), 0, 0
         self.waiting = [
@@ -417,10 +413,8 @@ class Shared:
         pair = other < self.count
         if self.machine.triggers:
             self._touched({*self.surface[other[~pair]].tolist()})
-        gained = -np.minimum(sums[1:3], 0.0).sum()
-        rounding = ROUNDING * ((push**2 + rub**2) * (self.light[one] + self.light[other])).sum()
-        if gained > rounding:
-            balance(sums[1:3], one, np.where(pair, other, one), self.count)
+        energy = (push**2 + rub**2) * (self.light[one] + self.light[other])
+        balance(sums[1:3], energy, one, other, self.count)
         self.recorder.by_surface[-1] += sums[:3] @ pair
         for k in np.flatnonzero(pair) if self.rides else ():
             for row, motion, sign in ((one, mine, -0.5), (other, others, 0.5)):
@@ -472,20 +466,12 @@ class Shared:
                 normal_impulse=push[told], tangential_impulse=rub[told],
             )  # fmt: skip
 
-    def _relief(self, speed: Floats) -> Any:
-        """Return deceleration by air over speed, 1/s (Schiller and Naumann, 1933)."""
-        reynolds = 2.0 * self.broad * speed * self.machine.air / VISCOSITY
-        coefficient = np.where(
-            reynolds < 1000.0, 24.0 * (1.0 + 0.15 * reynolds**0.687), 0.44 * reynolds
-        )
-        return coefficient * np.pi * self.broad * VISCOSITY / (4.0 * self.machine.particle.mass)
-
     def _slow_down(self) -> None:
         """Apply half a step of air drag to all free particles, as spheres; book the loss."""
         v = self.state[1, 2:4, : self.count]
         speed = np.hypot(*v)
-        middle = speed * np.exp(-0.25 * self.h * self._relief(speed))
-        left = np.where(self.free, np.exp(-0.5 * self.h * self._relief(middle)), 1.0)
+        middle = speed * np.exp(-0.25 * self.h * relief(self.machine, speed))
+        left = np.where(self.free, np.exp(-0.5 * self.h * relief(self.machine, middle)), 1.0)
         lost = 0.5 * self.machine.particle.mass * (v**2 * (1.0 - left**2)).sum(axis=0)
         v *= left
         self.entries[2, : self.count] += lost

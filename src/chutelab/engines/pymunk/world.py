@@ -36,7 +36,10 @@ PARTICLE, SURFACE = 1, 2
 GRIP = 1e9
 """Friction coefficient for inf, which Chipmunk would multiply with an impulse of 0."""
 
-DIGITS = 16.0 * float(np.finfo(float).eps)
+ROUNDING = float(np.finfo(float).eps)
+"""Share by which rounding changes a number."""
+
+DIGITS = 16.0 * ROUNDING
 """Share of the machine's size below which a gap is rounding."""
 
 TINY = 1e-12
@@ -436,20 +439,27 @@ class Carriage:
         )
 
 
-def balance(losses: Floats, one: Ints, other: Ints, count: int) -> None:
+def balance(losses: Floats, energy: Floats, one: Ints, other: Ints, count: int) -> None:
     """Change losses of contacts, (2, k), of which only the sum of each island is meaningful.
 
     Contacts that are solved together may seem to give energy that others take: within an island of
     particles that touch each other, negative losses are set against positive ones, in proportion,
-    first those along the normal and those along the surface for themselves.
+    first those along the normal and those along the surface for themselves. Losses that are
+    negative by rounding alone remain.
 
     Parameters
     ----------
+    energy
+        p²/m of the impulse p of each contact, J, added up over the masses m of both particles; of
+        this the rounding of velocities changes the losses by the share `ROUNDING`.
     one, other
-        The particles of each contact; the same one twice at a surface.
+        The rows of each contact: a particle, and another one or a surface.
     count
-        How many particles there are.
+        How many particles there are; their rows come first.
     """
+    if -np.minimum(losses, 0.0).sum() <= ROUNDING * energy.sum():
+        return
+    other = np.where(other < count, other, one)
     island, before = np.arange(count), None
     mine, others = one[one != other], other[one != other]
     while before is None or (island != before).any():

@@ -72,7 +72,7 @@ def test_without_belts_no_work_is_told_as_theirs():
     recording = simulate("see-saw")
     sheet = ledger(recording).sheet()
     assert sheet.columns == ("", "restitution loss", "friction loss", "work on it")
-    told = {row[0]: row[-1] for row in sheet.rows}
+    told = {row[0]: row[-1] for row in (*sheet.rows, *sheet.foot)}
     assert told["plank"] == told["particles"] == ""
     first, last = recording.ends()
     for name, m, k0, k1 in zip(("light", "heavy"), (0.008, 0.016), first, last, strict=True):

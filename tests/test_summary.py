@@ -279,3 +279,20 @@ def test_the_first_six_contacts_are_listed_where_no_theory_speaks_of_them():
     times = fall + 2.0 * fall * np.cumsum([0.0, *0.8 ** np.arange(1, 6)])
     assert [row[0] for row in way.rows] == ["meets floor"] * 6
     assert [float(row[1]) for row in way.rows] == pytest.approx(times, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", ["domino-gate", "flap-gate", "loop", "damper-plate"])
+def test_no_table_is_empty_and_none_counts_a_loss_twice(name):
+    """Σ losses of surfaces and particles = total = Σ losses of streams."""
+    found = {sheet.title: sheet for sheet in sheets(run(name))}
+    assert all(sheet.rows for title, sheet in found.items() if title)
+    for row in found["Particle 0"].rows if "Particle 0" in found else ():
+        assert "-" not in row
+    (losses,) = (sheet for title, sheet in found.items() if title.startswith("Energy ledger"))
+    for index, head in enumerate(losses.columns):
+        if head.endswith("loss"):
+            rows, (total, *parts) = (
+                [float(row[index]) for row in group] for group in (losses.rows, losses.foot)
+            )
+            assert sum(rows) == pytest.approx(total, rel=1e-5)
+            assert not parts or sum(parts) == pytest.approx(total, rel=1e-5)

@@ -99,7 +99,7 @@ class Ledger(Shown):
         return abs(self.residual) / self.turned_over if self.turned_over > 0.0 else 0.0
 
     def sheet(self, *, details: bool = False) -> Sheet:
-        """Return the entries of each surface that has any, their sum, and the residual.
+        """Return the entries of each surface that has any, their sum, its parts, and the residual.
 
         Works that are all 0 have no column. With `details` the residual is shown down to rounding.
         """
@@ -129,29 +129,30 @@ class Ledger(Shown):
         rows = [
             row(name, dict.fromkeys(names, 0.0) | entries)
             for name, entries in self.by_surface.items()
-            if any(entries.values())
         ]
-        total = row("total", {name: getattr(self, name) for name in names})
+        rows = [one for one in rows if {*one[1:]} - {"", "0"}]
+        foot = [row("total", {name: getattr(self, name) for name in names})]
         if len(every) > len(ENTRIES) and self.by_stream:
             # What moving surfaces and springs give a stream is not the work of belts.
-            heads, rows, total = [*heads, "work on it"], [[*one, ""] for one in rows], [*total, ""]
+            heads = [*heads, "work on it"]
+            rows, foot = ([[*one, ""] for one in part] for part in (rows, foot))
             for name, own in self.by_stream.items():
                 losses = {one: own[one] for one in LOSSES}
-                rows.append([*row(f"of {name}", losses), told(own["belt_work"])])
+                foot.append([*row(f"of {name}", losses), told(own["belt_work"])])
         else:
-            rows += [row(f"of {name}", own) for name, own in self.by_stream.items()]
+            foot += [row(f"of {name}", own) for name, own in self.by_stream.items()]
         kept = {"kinetic": self.kinetic, "potential above the origin": self.potential}
         kept |= {"spring": self.spring} if any(self.spring) else {}
-        moved = (
+        moved = [
             f"{name} {told(before, UNSEEN)} -> {told(after, UNSEEN)} J"
             for name, (before, after) in kept.items()
-        )
+        ]
         return Sheet(
             "Energy ledger, J",
             ("", *heads),
             tuple(map(tuple, rows)),
-            foot=(tuple(total),),
-            notes=(", ".join(moved), left),
+            foot=tuple(map(tuple, foot)),
+            notes=(*moved, left),
         )
 
 

@@ -199,14 +199,15 @@ class Comparison(Shown):
     def sheet(self, *, details: bool = False) -> Sheet:
         """Return every quantity that either has, and the largest error.
 
-        Beside the paper's power is the true one, the belt work at the same rate of particles.
-        Errors are in percent; with `details` they are shown down to rounding.
+        Without theory its columns are left out; without rows, the title too. Beside the paper's
+        power is the true one, the belt work at the same rate of particles. Errors are in percent;
+        with `details` they are shown down to rounding.
         """
 
         def written(error: float) -> str:
             return f"{error:.1e}" if details else f"{100.0 * error:.3f}"
 
-        rows = []
+        rows = list[tuple[str, ...]]()
         energy, power = self.theory["dEk"], self.theory["P"]
         rate = power / energy if energy > 0.0 else nan
         for name, row in THEORY.items():
@@ -225,10 +226,12 @@ class Comparison(Shown):
             foot = [("max", "largest relative error", "", "", written(self.max))]
         begun = any(isfinite(value) for value in self.theory.values())
         ends = "No closed form from here on" if begun else "No closed form"
+        heads = ("", "", "simulated", "theory", "error" if details else "error, %")
+        shown = len(heads) if begun else 3
         return Sheet(
-            "Particle 0",
-            ("", "", "simulated", "theory", "error" if details else "error, %"),
-            tuple(rows),
+            "Particle 0" if rows else "",
+            heads[:shown],
+            tuple(row[:shown] for row in rows),
             foot=tuple(foot),
             texts=2,
             notes=(f"{ends}; {self.reason}",) if self.reason else (),

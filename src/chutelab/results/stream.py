@@ -343,7 +343,7 @@ class Crowd(Shown):
         ]
         heads = ("", *COLUMNS.values()) if rows else ()
         written = tuple(map(sentence, notes))
-        return Sheet("All particles", heads, tuple(rows), notes=written)
+        return Sheet("All particles" if rows else "", heads, tuple(rows), notes=written)
 
 
 COLUMNS = {"mean": "mean", "spread": "spread", "q02": "2 %", "q50": "50 %", "q98": "98 %"}

@@ -294,9 +294,8 @@ def sheets(recording: Record, *, details: bool = False) -> list[Sheet]:
         parts += nominal
     until = recording.scene.run.until
     # Belt work goes on after the landing; `belt_work` above counts until nothing slips.
-    ends = {"landed": "the landing", "settled": "all have settled or left"}.get(
-        str(until), f"t = {until} s"
-    )
+    ends = {"landed": "the landing", "settled": "all have settled or left"}.get(str(until))
+    ends = ends or f"t = {number(float(until))} s"
     balance = ledger(recording).sheet(details=details)
     parts.append(replace(balance, title=f"Energy ledger until {ends}, J"))
     if (sensors := sensor_sheet(recording)) is not None:

@@ -325,6 +325,70 @@ DAMAGE = """([column, change]) => {
 }"""
 
 
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_the_energy_of_a_crowd_is_balanced_after_changes_during_its_run(shown, language):
+    """Σ energies - start - work + losses - given = residual: rounding, and what a step leaves.
+
+    With other friction nothing is given, and no entry jumps. What the particles that are taken away
+    had beyond their own balance they got from others: of that the rest gave the opposite.
+    """
+    page = shown("hopper", ["stream.count=120"], language=language)
+    page.evaluate("chutelab.lab.allow(1e9)")
+    page.evaluate(DONE)
+    balances = """(from) => {
+      const { recording } = chutelab.lab, found = [];
+      for (let t = from; t < recording.end; t += 1 / 60) {
+        const at = recording.ledger(t), losses = at.friction_loss + at.restitution_loss;
+        const whole = at.kinetic + at.potential, { start, belt_work, changed, residual } = at;
+        found.push([whole - start - belt_work + losses - changed, residual, changed, losses,
+          Math.abs(start) + Math.abs(at.potential) + losses]);
+      }
+      return found;
+    }"""
+    change = """async ([t, values]) => {
+      const { lab } = chutelab, before = lab.recording.ledger(t);
+      lab.seek(t);
+      lab.change(values);
+      return [before.friction_loss, lab.recording.ledger(t).friction_loss];
+    }"""
+    entry = page.locator("#energy tr[data-id=changed]")
+    friction = page.evaluate(change, [0.75, {"surface[0].friction": 0.7}])
+    page.evaluate(DONE)
+    page.evaluate("chutelab.lab.allow(1e9)")
+    page.evaluate(DONE)
+    off, residual, changed, _, size = np.array(page.evaluate(balances, 0.0)).T
+    assert friction[0] == pytest.approx(friction[1], rel=1e-9)
+    for one in (off, residual, changed):
+        assert np.abs(one).max() < 1e-12 * size.max()
+    assert entry.is_hidden()
+    open_ = page.evaluate("""() => {
+      const { recording } = chutelab.lab;
+      return recording.tracks.slice(80).reduce((sum, _, n) =>
+        sum + (recording.ledgerOf(80 + n, 0.85)?.residual ?? 0), 0);
+    }""")
+    page.evaluate(change, [0.85, {"stream.count": 80}])
+    page.evaluate(DONE)
+    page.evaluate("chutelab.lab.allow(1e9)")
+    page.evaluate(DONE)
+    off, residual, changed, losses, size = np.array(page.evaluate(balances, 0.86)).T
+    assert np.abs(off).max() < 1e-12 * size.max()
+    assert np.abs(residual).max() < 1e-12 * size.max()
+    assert np.ptp(changed) < 1e-12 * size.max()
+    assert abs(changed[0]) > 1e-3 * size.max()
+    assert changed[0] == pytest.approx(-open_, rel=1e-2)
+    assert (np.diff(losses) > -1e-6 * losses[-1]).all()
+    name = {"en": "from changes in the run", "de": "durch Änderungen im Lauf"}[language]
+    assert name in entry.inner_text()
+    # What a step itself leaves is still the residual.
+    left = page.evaluate("""() => {
+      const { recording } = chutelab.lab, t = 0.951, [before, after] = recording.stepAt(t);
+      before[1] += 0.001;
+      after[1] += 0.001;
+      return recording.ledger(t).residual;
+    }""")
+    assert left == pytest.approx(1e-3, abs=1e-9)
+
+
 def test_a_page_shows_no_work_and_no_numbers_that_its_machine_has_not(shown, tmp_path):
     """A see-saw has no drive and no belt. A lone ball falls from height 0: m g y = -½ m g² t²."""
     for name, has in (("see-saw", False), ("perpendicular", True)):

@@ -3,7 +3,7 @@
 import { card, follow, html, icon } from "./panels.ts";
 import type { Lab } from "./lab.ts";
 import { isDriven, isPaid } from "./machine.ts";
-import type { Recording, Ledger } from "./recording.ts";
+import { ROUNDING, type Recording, type Ledger } from "./recording.ts";
 import type { Words } from "./words.ts";
 
 type Entry = [keyof Ledger, number];
@@ -11,14 +11,14 @@ type Entry = [keyof Ledger, number];
 const SIGNS: Entry[] = [
   ["start", 1], ["belt_work", 1], ["push_work", 1], ["kinetic", -1], ["potential", -1],
   ["spring", -1], ["restitution_loss", -1], ["friction_loss", -1], ["damper_loss", -1],
-  ["residual", 1],
+  ["changed", 1], ["residual", 1],
 ];
 
 /** Entries that exist only with hinges and springs. */
 const KEPT: Record<string, string[]> = { spring: ["spring", "stiffness"], damper_loss: ["damper"] };
 
-/** A residual below this part of the whole is rounding, and not shown. */
-const TINY_RESIDUAL = 1e-12;
+/** Entries that are not shown where they are rounding. */
+const ROUNDED: string[] = ["residual", "changed"];
 
 /** A work below this part of the whole, in a machine without drives, is not shown: within a step
  * the paths of particles and those of hinges are interpolated apart, which leaves up to 2e-4. */
@@ -27,14 +27,14 @@ const TINY_WORK = 1e-3;
 /** J; less is shown as 0. */
 const UNSEEN = 5e-13;
 
-/** The energy put in, and where it is: an entry of the opposite sign changes sides. A residual by
- * rounding is in neither. */
+/** The energy put in, and where it is: an entry of the opposite sign changes sides. Rounding
+ * is in neither. */
 function stacks(ledger: Ledger) {
   const entries = SIGNS.map(([name, sign]) => [name, sign * ledger[name]] as Entry);
   const side = (sign: number) =>
     entries.map(([name, value]) => [name, Math.max(sign * value, 0)] as Entry);
   const size = side(1).reduce((sum, [, value]) => sum + value, 0);
-  const shown = ([name, value]: Entry) => name !== "residual" || value > TINY_RESIDUAL * size;
+  const shown = ([name, value]: Entry) => !ROUNDED.includes(name) || value > ROUNDING * size;
   return { putIn: side(1).filter(shown), isNow: side(-1).filter(shown), size };
 }
 
@@ -102,13 +102,13 @@ class EnergyPanel {
         return part;
       }));
     });
-    const isClosed = Math.abs(ledger.residual) <= Math.max(UNSEEN, TINY_RESIDUAL * size);
-    this.closes.hidden = !isClosed;
+    const rounding = Math.max(UNSEEN, ROUNDING * size);
+    this.closes.hidden = Math.abs(ledger.residual) > rounding;
     this.closes.replaceChildren(icon("tick"),
       this.words.say("energy-closes", { energy: this.words.energy(size) }));
     SIGNS.forEach(([name], n) => {
       this.cells.get(name).textContent = this.words.energy(ledger[name], size);
-      this.rows[n].hidden = (name === "residual" && isClosed)
+      this.rows[n].hidden = (ROUNDED.includes(name) && Math.abs(ledger[name]) <= rounding)
         || (name === "belt_work" && !this.paid && Math.abs(ledger[name]) < TINY_WORK * size)
         || (name === "push_work" && !recording.pushes.length && !ledger.push_work)
         || (KEPT[name] && ![...machine.movers, ...machine.joints].some((one: any) =>

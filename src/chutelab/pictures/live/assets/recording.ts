@@ -9,7 +9,16 @@ import { SWING_ROW, Swings, posed, type Hung } from "./motion.ts";
 export type State = { x: number, y: number, vx: number, vy: number, spin: number, ended: boolean };
 export type Ledger = { start: number, kinetic: number, potential: number, belt_work: number,
   push_work: number, restitution_loss: number, friction_loss: number, residual: number,
-  spring: number, damper_loss: number };
+  spring: number, damper_loss: number, changed: number };
+
+/** The part of the energy below which what is missing in a balance is rounding. */
+const ROUNDING = 1e-12;
+
+const NOTHING: Ledger = {
+  start: 0, kinetic: 0, potential: 0, belt_work: 0, push_work: 0, restitution_loss: 0,
+  friction_loss: 0, residual: 0, spring: 0, damper_loss: 0, changed: 0,
+};
+const ENTRIES = Object.keys(NOTHING) as (keyof Ledger)[];
 
 const T = 0, X = 1, Y = 2, VX = 3, VY = 4, SPIN = 5, BELT = 6, RESTITUTION = 7, FRICTION = 8,
   ANGLE = 10;
@@ -247,6 +256,8 @@ class Recording {
    * added. */
   renamed: { index: number, entries: number[], goesOn: boolean }[] | null = null;
   shift = 0;
+  /** From the last change on: what is to be added to the sum of all particles' ledgers. */
+  sinceChange: Partial<Ledger> = {};
   /** Belt work, restitution and friction loss by surface, and between particles, J, after the run;
    * none if the scene was changed during it. */
   books: number[][] | null = null;
@@ -268,7 +279,8 @@ class Recording {
   loads = new Float64Array();
   /** Times, s, and the work of all pushes and of all surfaces up to then, J. */
   pushes: [number, number, number][] = [];
-  /** Of a crowd: totals of all particles at the steps, `TOTAL_ROW` numbers each. */
+  /** Of a crowd: totals of all particles at the steps, `TOTAL_ROW` numbers each; those before a
+   * change only if it left all particles as they were. */
   totals: Float64Array[] = [];
   /** The laws that it breaks, once it is finished and judged. */
   breaches: Breach[] = [];
@@ -333,7 +345,10 @@ class Recording {
     if (triggered.length) actAt(this.machine, triggered);
     const [, before, gave] = this.pushes.at(-1) ?? [0, 0, 0];
     if (pushed !== before) this.pushes.push([this.now, before, gave], [now, pushed, given]);
-    if (totals?.length) this.totals.push(totals);
+    if (totals?.length) {
+      for (let k = 0; k < totals.length; k += TOTAL_ROW) totals[k] += this.shift;
+      this.totals.push(totals);
+    }
     this.measure();
     this.state = state;
     this.now = state === "running" ? now + this.shift : Math.max(this.end, now + this.shift);
@@ -383,6 +398,7 @@ class Recording {
       return ledger
         ? [ledger.belt_work, ledger.restitution_loss, ledger.friction_loss] : [0, 0, 0];
     });
+    const closing = this.closing(t, this.sumOf(t));
     this.tracks = was.map((index, i) => this.tracks[index] ?? trackOf(machine, i));
     this.events = this.renumbered(t, was, machine.surfaces);
     machine.releases.forEach((release, index) => {
@@ -405,6 +421,7 @@ class Recording {
     this.measure();
     this.machine = machine;
     this.renamed = renamed;
+    this.closeAtChange(t, closing);
     this.shift = t;
     this.loads = new Float64Array();
     this.books = null;
@@ -478,6 +495,7 @@ class Recording {
     return {
       start, kinetic: kinetic(state), potential: potential(state), belt_work: belt, push_work: 0,
       restitution_loss: restitution, friction_loss: friction, residual, spring: 0, damper_loss: 0,
+      changed: 0,
     };
   }
 
@@ -521,7 +539,7 @@ class Recording {
     return {
       start, kinetic, potential, belt_work, push_work, spring, restitution_loss, friction_loss,
       damper_loss, residual: kinetic + potential + spring - start - belt_work - push_work
-        + restitution_loss + friction_loss + damper_loss,
+        + restitution_loss + friction_loss + damper_loss, changed: 0,
     };
   }
 
@@ -541,34 +559,59 @@ class Recording {
     return total;
   }
 
-  /** The ledger of all released particles, from their tracks. */
-  tracksLedger(t: number): Ledger {
-    const total: Ledger = {
-      start: 0, kinetic: 0, potential: 0, belt_work: 0, push_work: 0, restitution_loss: 0,
-      friction_loss: 0, residual: 0, spring: 0, damper_loss: 0,
-    };
-    const names = Object.keys(total) as (keyof Ledger)[];
+  /** The sum of the ledgers of all released particles. */
+  sumOf(t: number): Ledger {
+    const total = { ...NOTHING };
     for (let index = 0; index < this.tracks.length; index += 1) {
       const its = this.ledgerOf(index, t);
-      if (its) for (const name of names) total[name] += its[name];
+      if (its) for (const name of ENTRIES) total[name] += its[name];
     }
-    // In a track the work of pushes is part of that of drives.
-    total.push_work = this.pushedAt(t, total.belt_work);
-    total.belt_work -= total.push_work;
-    // Particles give energy to each other within a step. The residual is that of the totals, and
-    // the rest of the balance belongs to the process that goes on among all.
-    const step = this.renamed ? null : this.stepAt(t);
+    return total;
+  }
+
+  /** What is to be added to the sum of all particles' ledgers. Particles give energy to each other
+   * within a step: the residual is that of the totals, and the rest of the balance belongs to the
+   * process that goes on among all; without totals, it is due to a change. */
+  closing(t: number, sum: Ledger): Partial<Ledger> {
+    const since = t >= this.shift ? this.sinceChange : {}, step = this.stepAt(t);
+    if (!step && !this.renamed) return since;
+    let [process, sign, straight]: [keyof Ledger, number, number] = ["changed", 1, 0];
     if (step) {
       const [a, b, s] = step;
       const [from, to] = [a, b].map(([, kinetic, potential, work, restitution, friction, , released,
         kept, spring, damper]) => kinetic + potential + spring - released - kept - work
         + restitution + friction + damper);
-      const straight = from + s * (to - from), missing = total.residual - straight;
-      const [process, , sign] = PROCESSES.find(([, column]) => a[column] !== b[column])
-        ?? ["residual", 0, 1] as const;
-      total.residual = straight;
-      total[process] += sign * missing;
+      straight = from + s * (to - from);
+      const going = PROCESSES.find(([, column]) => a[column] !== b[column]);
+      [process, sign] = going ? [going[0], going[2]] : ["residual", 0];
     }
+    const missing = sum.residual + (since.residual ?? 0) - straight;
+    return {
+      ...since, [process]: (since[process] ?? 0) + sign * missing,
+      residual: straight - sum.residual,
+    };
+  }
+
+  /** Set what the ledger has from a change on: what the change gives, as removed particles gave to
+   * others, is an entry of its own.
+   * @param closing what closed the balance before the change */
+  closeAtChange(t: number, closing: Partial<Ledger>) {
+    const sum = this.sumOf(t), given = sum.residual + (closing.residual ?? 0);
+    this.sinceChange = {
+      ...closing, changed: (closing.changed ?? 0) + given, residual: -sum.residual,
+    };
+    const size = sum.start + Math.abs(sum.belt_work) + sum.restitution_loss + sum.friction_loss;
+    if (Math.abs(given) > ROUNDING * size) this.totals = [];
+    else this.totals = this.totals.filter((all) => all[0] <= t);
+  }
+
+  /** The ledger of all released particles, from their tracks. */
+  tracksLedger(t: number): Ledger {
+    const total = this.sumOf(t), closing = this.closing(t, total);
+    // In a track the work of pushes is part of that of drives.
+    total.push_work = this.pushedAt(t, total.belt_work);
+    total.belt_work -= total.push_work;
+    for (const name of ENTRIES) total[name] += closing[name] ?? 0;
     return total;
   }
 
@@ -596,4 +639,4 @@ class Recording {
   }
 }
 
-export { Recording, Track };
+export { Recording, ROUNDING, Track };

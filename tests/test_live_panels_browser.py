@@ -389,6 +389,21 @@ def test_the_energy_of_a_crowd_is_balanced_after_changes_during_its_run(shown, l
     assert left == pytest.approx(1e-3, abs=1e-9)
 
 
+def test_the_energy_of_joined_particles_is_there_from_their_release_on(shown):
+    """One ball of the cradle, a sphere of steel on 0.4 m of string, is lifted by 30°, at rest:
+    m g L (1 - cos 30°).
+    """
+    page = shown("cradle")
+    energy = 7850.0 * 4.0 / 3.0 * np.pi * 0.02**3 * 9.81 * 0.4 * (1.0 - np.cos(np.pi / 6.0))
+    for t in (0.0, 1e-4, 0.3, 1.0):
+        page.evaluate(f"chutelab.lab.seek({t})")
+        told = page.locator("#energy tr[data-id=start] td")
+        playwright.expect(told).to_have_text(f"{1e3 * energy:.1f} mJ")
+        full, bar = (page.locator(f"#energy {part}").bounding_box()["width"]
+                     for part in ("#put-in", "#put-in i"))  # fmt: skip
+        assert bar > 0.98 * full
+
+
 def test_a_page_shows_no_work_and_no_numbers_that_its_machine_has_not(shown, tmp_path):
     """A see-saw has no drive and no belt. A lone ball falls from height 0: m g y = -½ m g² t²."""
     for name, has in (("see-saw", False), ("perpendicular", True)):

@@ -532,8 +532,18 @@ class Recording {
     const step = this.machine.joints.length ? this.stepAt(t) : null;
     if (!step) return null;
     const [a, b, s] = step;
+    const between = a.map((value, k) => value + s * (b[k] - value));
+    // What is released at or after the beginning of a step is not in the totals of that instant.
+    this.tracks.forEach(({ begin }, index) => {
+      const its = begin >= a[0] && begin < b[0] ? this.ledgerOf(index, begin) : null;
+      if (!its) return;
+      const counted = Number(t >= begin) - s;
+      between[1] += counted * its.kinetic;
+      between[2] += counted * its.potential;
+      between[7] += counted * its.start;
+    });
     const [, kinetic, potential, work, restitution_loss, friction_loss, , released, kept, spring,
-      damper_loss, gave] = a.map((value, k) => value + s * (b[k] - value));
+      damper_loss, gave] = between;
     const push_work = this.pushedAt(t, work - gave), start = released + kept;
     const belt_work = work - gave - push_work;
     return {

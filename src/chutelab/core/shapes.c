@@ -114,11 +114,20 @@ static double clear_of(const Shape *a, int edge, const Shape *b) {
     return least;
 }
 
+/* Whether the centre of a particle is between a segment and the piece that is next to it: at an end, on one side, as the
+   rows of `beside` are. */
+static int is_in_hollow(const Shape *a, const Surface *s, int row) {
+    const double *end = s->end + row / 2 * 2;
+    double x = a->x - end[0], y = a->y - end[1], inwards = row < 2 ? 1 : -1, side = row % 2 ? -1 : 1;
+    double off = side * (y * s->tx - x * s->ty);
+    return s->beside[row] >= 0 && off > 0 && inwards * (x * s->tx + y * s->ty) > off * s->hollows[row];
+}
+
 /* The edge that a corner of `b` is on. If the corner is outside of `a` by `near`, that is the edge that it is furthest
    outside of. Else it is the edge that faces `b` (see `are_apart`): with another one, a particle that overlaps by more than
    the distance of its corners would be pressed sideways. At an end of a surface, the line by which the surface continues
-   from there, as long as the inner radius of `a`, counts for that: so a corner that slides off the end stays on the edge
-   on which it came. */
+   from there, as long as the inner radius of `a`, counts for that, and at a ridge that of the piece next to it: so a corner
+   that slides off the end stays on the edge on which it came. */
 static int edge_under(const Shape *a, const Shape *b, const double *q, double near) {
     double off, best = -INFINITY, on = near / TOUCH;
     int found = furthest(a, q, &off);
@@ -136,6 +145,13 @@ static int edge_under(const Shape *a, const Shape *b, const double *q, double ne
     memcpy(end.p[0], q, sizeof end.p[0]);
     end.p[1][0] = q[0] + on * x;
     end.p[1][1] = q[1] + on * y;
+    for (int row = q == b->p[0] ? 0 : 2, last = row + 1; row <= last && b->s->shape == SEGMENT; row++) {
+        if (b->s->beside[row] < 0 || is_in_hollow(a, b->s, row)) continue;
+        double far = b->s->hollows[row], sine = 1 / sqrt(1 + far * far), off = fabs(on) * sine;
+        if (row % 2) off = -off;
+        end.p[end.count][0] = q[0] + on * far * sine * x - off * y;
+        end.p[end.count++][1] = q[1] + on * far * sine * y + off * x;
+    }
     for (int e = 0; e < a->count; e++) {
         double clear = clear_of(a, e, &end);
         if (clear <= best) continue;
@@ -280,20 +296,18 @@ static int has_passed(const Shape *a, const Surface *s, const double *q) {
     return (off >= 0) != (mid >= 0) && cut >= 0 && cut <= s->length * both;
 }
 
-/* How far beyond an end of a segment a corner on one of its sides, 1 or -1, may be and still be on the segment: only
-   rounding, unless the segment continues smoothly there; or without bound, if the corner has passed through one of two pieces
-   between which the centre is: then it is beyond the end of either. */
+/* How far beyond an end of a segment a corner on one of its sides, 1 or -1, is still on the segment: a little if the segment
+   continues smoothly there; without bound if the corner has passed through one of two pieces between which the centre is, as
+   then it is beyond the end of either. */
 static double past_end(const Shape *a, const Surface *s, const double *q, int end, int side, double near) {
-    double x = a->x - s->end[2 * end], y = a->y - s->end[2 * end + 1], along = x * s->tx + y * s->ty;
-    double off = side * (y * s->tx - x * s->ty);
-    int row = 2 * end + (side < 0), next = s->beside[row];
+    int row = 2 * end + (side < 0);
     if (mate_of(s, end) >= 0) return near;
-    if (next < 0 || off <= 0 || (end ? -along : along) <= off * s->hollows[row]) return ROUNDED * near;
-    return has_passed(a, s, q) || has_passed(a, surface_at(next, s->posed), q) ? INFINITY : ROUNDED * near;
+    if (!is_in_hollow(a, s, row)) return 0;
+    return has_passed(a, s, q) || has_passed(a, surface_at(s->beside[row], s->posed), q) ? INFINITY : 0;
 }
 
 /* The side of a segment that a corner is on: its own, or that of the centre if the corner has passed through the segment,
-   also a little beyond an end, see `past_end`. */
+   also a little beyond an end, see `past_end`. It has not if the line crosses the piece next to it as well, at a ridge. */
 int side_of(const Shape *a, const Surface *s, int corner, double near) {
     const double *q = a->p[corner];
     double x = q[0] - s->x, y = q[1] - s->y, u = a->x - s->x, v = a->y - s->y;
@@ -302,7 +316,12 @@ int side_of(const Shape *a, const Surface *s, int corner, double near) {
     if (own == centre) return own;
     double cut = ((x * s->tx + y * s->ty) * fabs(mid) + (u * s->tx + v * s->ty) * fabs(off)) / both;
     double past = MAX(-cut, cut - s->length);
-    return past <= 0 || past <= past_end(a, s, q, cut > 0, centre, near) ? centre : own;
+    if (past > 0) return past <= past_end(a, s, q, cut > 0, centre, near) ? centre : own;
+    for (int end = 0; end < 2; end++) {
+        int next = s->beside[2 * end + (centre < 0)];
+        if (next >= 0 && has_passed(a, surface_at(next, s->posed), q)) return own;
+    }
+    return centre;
 }
 
 /* Find what a candidate is on, and fill in its place; return 0 if it doesn't touch there. */
@@ -315,7 +334,7 @@ int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
             t->on = side_of(a, b->s, t->which, near);
             fill_in(a, b, t);
             double past = MAX(-along, along - b->s->length);
-            return past <= 0 || past <= past_end(a, b->s, q, along > 0, t->on, near);
+            return past <= ROUNDED * near || past <= past_end(a, b->s, q, along > 0, t->on, near);
         }
         if (b->s) {
             double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);

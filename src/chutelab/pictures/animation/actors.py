@@ -373,9 +373,11 @@ def bars(
         drawn.append(Bar(ax, left, left + 0.8, heights, [style.ENERGY[name] for name in heights]))
     picture, writings = ax.figure.canvas.figure, []
     left, bottom, width, height = column
+    # Three digits of the highest bar, so that the rows add up to it.
+    places = 1 if factor * highest >= 10.0 else 2
     rows = {}
     for name in sides[0]:
-        shown = [round(factor * value, 1) + 0.0 for value in balance[name].tolist()]
+        shown = [round(factor * value, places) + 0.0 for value in balance[name].tolist()]
         absent = {
             "belt_work": not drives, "spring": not balance[name].any(),
             "damper_loss": not balance[name].any(), "residual": not any(shown),
@@ -385,7 +387,7 @@ def bars(
     line = height / max(ROWS, len(rows))
     for row, (name, shown) in enumerate(rows.items()):
         told = drives if name == "belt_work" else say(f"ledger-{name}")
-        said = [figures(value, ".1f") for value in shown]
+        said = [figures(value, f".{places}f") for value in shown]
         top = bottom + height - row * line
         key = Rectangle((left, top - 0.8 * line), 0.05 * width, 0.6 * line)
         key.set(color=style.ENERGY[name], transform=picture.transFigure)

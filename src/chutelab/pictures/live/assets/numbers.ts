@@ -148,7 +148,9 @@ class NumbersPanel {
         words.say("crowd-loss", { name: words.name(name) }), words.energy(loss)] as [string, string, string]),
     ];
     this.crowd.replaceChildren(...rows.filter(([, , told]) => told).map(([id, name, told]) =>
-      html("tr", { "data-id": id }, html("th", { scope: "row" }, name), html("td", {}, told))));
+      html("tr", { "data-id": id }, html("th", { scope: "row" }, name),
+        // No line begins with a unit.
+        html("td", {}, told.replace(/(\d) (?=\p{L})/gu, "$1\u00a0")))));
   }
 }
 

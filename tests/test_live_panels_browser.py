@@ -412,6 +412,11 @@ def test_a_page_shows_no_work_and_no_numbers_that_its_machine_has_not(shown, tmp
         assert page.locator("#energy tr[data-id=kinetic]").is_visible()
         assert page.locator("#energy tr[data-id=belt_work]").is_visible() is has
         assert page.locator("#numbers").is_visible() is has
+        assert page.locator("#numbers .of-rail").is_visible() is has
+    # No closed form has a plate on a hinge, and no column has dashes alone.
+    page = shown("damper-plate")
+    assert not page.locator("#numbers .of-rail").is_visible()
+    assert all(text[-1].isdigit() for text in page.locator("#numbers td").all_inner_texts() if text)
     alone = tmp_path / "alone.toml"
     alone.write_text("[particle]\nradius = 0.01\nmass = 0.02\n[stream]\nat = [0.0, 0.5]\n"
                      "velocity = [0.0, 0.0]\n[run]\nuntil = 0.5\n")  # fmt: skip

@@ -64,6 +64,7 @@ function numbersOf(
 class NumbersPanel {
   body;
   simulated;
+  analytic;
   reason;
   lone;
   crowd;
@@ -75,8 +76,8 @@ class NumbersPanel {
   constructor(home: Element, readonly lab: Lab, readonly words: Words) {
     this.body = html("tbody");
     this.simulated = html("th", { scope: "col", class: "of-run" });
-    const head = html("thead", {}, html("tr", {}, html("td"), this.simulated,
-      html("th", { scope: "col", class: "of-rail" }, words.say("analytic"))));
+    this.analytic = html("th", { scope: "col", class: "of-rail" }, words.say("analytic"));
+    const head = html("thead", {}, html("tr", {}, html("td"), this.simulated, this.analytic));
     this.reason = html("p", { class: "note" });
     this.lone = html("div", {}, html("table", {}, head, this.body), this.reason);
     this.crowd = html("tbody");
@@ -111,12 +112,14 @@ class NumbersPanel {
     const rows = numbersOf(crowd ? stages.slice(0, 1) : stages, numbers,
       machine.pulley?.radius ?? NaN, machine.radius)
       .filter(({ simulated, analytic }) => isFinite(simulated) || isFinite(analytic));
+    // Without theory there is no column of it.
+    this.analytic.hidden = !rows.some(({ analytic }) => isFinite(analytic));
     this.body.replaceChildren(...rows.map(({ id, simulated, analytic }) => {
       const { symbol, unit } = lab.data.quantities[id];
       return html("tr", { "data-id": id },
         html("th", { scope: "row" }, html("b", {}, symbol),
           ` ${words.say(`number-${id}`)},\u00a0${words.unit(unit)}`),
-        ...[simulated, analytic].map((value) =>
+        ...(this.analytic.hidden ? [simulated] : [simulated, analytic]).map((value) =>
           html("td", {}, words.number(Math.abs(value) < ROUNDED ? 0 : tidy(value)))));
     }));
     this.asked.hidden ||= this.none;

@@ -120,7 +120,7 @@ static int is_in_hollow(const Shape *a, const Surface *s, int row) {
     const double *end = s->end + row / 2 * 2;
     double x = a->x - end[0], y = a->y - end[1], inwards = row < 2 ? 1 : -1, side = row % 2 ? -1 : 1;
     double off = side * (y * s->tx - x * s->ty);
-    return s->beside[row] >= 0 && off > 0 && inwards * (x * s->tx + y * s->ty) > off * s->hollows[row];
+    return off > 0 && inwards * (x * s->tx + y * s->ty) > off * s->hollows[row];
 }
 
 /* The edge that a corner of `b` is on. If the corner is outside of `a` by `near`, that is the edge that it is furthest
@@ -297,13 +297,15 @@ static int has_passed(const Shape *a, const Surface *s, const double *q) {
 }
 
 /* How far beyond an end of a segment a corner on one of its sides, 1 or -1, is still on the segment: a little if the segment
-   continues smoothly there; without bound if the corner has passed through one of two pieces between which the centre is, as
-   then it is beyond the end of either. */
+   continues smoothly there, and by rounding; without bound if the corner has passed through one of two pieces between which
+   the centre is, as then it is beyond the end of either. If a piece is next to it there and the centre is not between them,
+   that one is in between: not at all. */
 static double past_end(const Shape *a, const Surface *s, const double *q, int end, int side, double near) {
     int row = 2 * end + (side < 0);
     if (mate_of(s, end) >= 0) return near;
+    if (s->beside[row] < 0) return ROUNDED * near;
     if (!is_in_hollow(a, s, row)) return 0;
-    return has_passed(a, s, q) || has_passed(a, surface_at(s->beside[row], s->posed), q) ? INFINITY : 0;
+    return has_passed(a, s, q) || has_passed(a, surface_at(s->beside[row], s->posed), q) ? INFINITY : ROUNDED * near;
 }
 
 /* The side of a segment that a corner is on: its own, or that of the centre if the corner has passed through the segment,
@@ -334,7 +336,7 @@ int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
             t->on = side_of(a, b->s, t->which, near);
             fill_in(a, b, t);
             double past = MAX(-along, along - b->s->length);
-            return past <= ROUNDED * near || past <= past_end(a, b->s, q, along > 0, t->on, near);
+            return past <= 0 || past <= past_end(a, b->s, q, along > 0, t->on, near);
         }
         if (b->s) {
             double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);

@@ -43,7 +43,7 @@ def test_a_tip_meets_a_ridge_that_is_as_thin_as_a_hair_there(past, slope):
 
 
 @pytest.mark.parametrize("bend", [0.01, 0.05, 0.3])
-@pytest.mark.parametrize("lean", [0.003, 0.03])
+@pytest.mark.parametrize("lean", [0.003, 0.03, 0.3])
 @pytest.mark.parametrize("gap", [1e-6, 1e-8, 1e-12, -1e-10])
 def test_a_tip_slides_over_a_ridge_without_a_blow(bend, lean, gap):
     """Without weight nothing acts on a needle whose tip slides along a face and off a ridge.

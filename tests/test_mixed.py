@@ -685,26 +685,75 @@ def test_a_box_that_falls_on_a_belt_with_adhesion_is_gripped(drop):
 
 
 def gripped(seed):
-    """Draw balls that a belt carries by adhesion, and boxes that fall on it and among them."""
+    """Draw balls that a belt carries by adhesion, and boxes or polygons that fall among them."""
     random = np.random.default_rng(seed)
     draw, one_of = random.uniform, random.choice
     meets = {"interact": True, "restitution": draw(0.0, 0.8), "friction": draw(0.0, 0.6)}
     return {
-        "incoming": {"speed": draw(0.3, 3.0), "pulley_radius": draw(0.05, 0.1), "length": 0.6},
+        "incoming": {"speed": draw(0.3, 3.0), "pulley_radius": draw(0.05, 0.1), "length": 0.6,
+                     "incline_deg": float(one_of([-10.0, 0.0, 10.0]))},
         "plate": {"distance": 0.5, "restitution": 0.3, "friction": 0.3},
         "outgoing": {"drop": 0.5, "length": 3.0},
         "particle": [{**ROUND, "radius": 0.0063, "mass": 0.008},
-                     {**BOX, "name": "box", "size": list(draw(0.01, 0.05, 2)), "mass": 0.05}],
+                     {"name": "box", **a_shape(random, draw(0.01, 0.06)), "spin": True,
+                      "mass": 0.05}],
         "stream": [
             {"particle": "ball", "count": int(one_of([1, 20, 60])), "rate": 30.0, **meets},
-            {"particle": "box", "count": int(one_of([1, 3, 6])), "rate": 5.0,
+            {"particle": "box", "count": int(one_of([1, 6, 20])), "rate": draw(5.0, 40.0),
              "at": [draw(-0.4, 0.5), draw(0.25, 0.6)], "velocity": [0.0, draw(-1.0, 0.0)],
              "omega": draw(-5.0, 5.0), **meets},
         ],
-        "run": {"until": 2.0},
+        "run": {"until": float(one_of([2.0, 5.0]))},
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", seeds(4, 100))
-def test_random_boxes_among_balls_that_a_belt_carries_keep_the_laws(seed):
-    sound(chutelab.simulate(gripped(seed), engine="contact"))
+def wedged(seed):
+    """Draw polygons that the lower belt draws under the plate's end, where most are too large,
+    and balls among them."""
+    random = np.random.default_rng(seed)
+    draw, one_of = random.uniform, random.choice
+    corners, size = int(random.integers(3, 9)), draw(0.022, 0.036)
+    around = np.arange(corners) * 2.0 * pi / corners
+    points = size * np.stack([np.cos(around), np.sin(around)], axis=1)
+    rough, speed = float(one_of([0.2, 0.5, 1.0, 5.0])), draw(0.5, 2.5)
+    meets = {"interact": True, "restitution": float(one_of([0.0, 0.3, 0.6]))}
+    return {
+        "incoming": {"speed": speed, "pulley_radius": 0.08, "length": 0.6},
+        "plate": {"distance": 0.5, "restitution": 0.3, "friction": float(one_of([0.0, 0.3, 1.0]))},
+        "outgoing": {"drop": 0.5, "drop_from": "top", "length": 3.0,
+                     "speed": float(one_of([speed, 3.0])), "friction": rough},
+        "particle": [{"name": "stone", "shape": "polygon", "points": points.tolist(),
+                      "spin": True, "mass": 0.05},
+                     {**ROUND, "radius": draw(0.004, 0.01), "mass": 0.008}],
+        "stream": [
+            {"particle": "stone", "count": int(one_of([3, 10, 20])), "rate": draw(5.0, 40.0),
+             "at": [draw(-0.3, 0.5), 0.5], "velocity": [1.0, 0.0], "omega": draw(-8.0, 8.0),
+             "friction": min(rough, 1.0), **meets},
+            {"particle": "ball", "count": int(one_of([20, 60])), "rate": 30.0, "friction": 0.5,
+             **meets},
+        ],
+        "run": {"until": 3.0},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("draw", "seed"),
+    [*((gripped, seed) for seed in (0, 1, 2, 24, 40, 61, 85)),
+     *((wedged, seed) for seed in (0, 1, 2, 38, 41, 43, 56, 80))],
+)  # fmt: skip
+def test_random_polygons_on_belts_that_grip_or_wedge_them_keep_the_laws(draw, seed):
+    """Those from 24 on broke one: losses of up to 3 J were given back, and overlaps were 8 %."""
+    sound(chutelab.simulate(draw(seed), engine="contact"))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:LAW BROKEN, no loss is negative")
+@pytest.mark.parametrize("draw", [gripped, wedged])
+def test_few_belts_that_wedge_polygons_gain_from_losses_and_they_are_told(draw):
+    """Rigid bodies in a wedge may have no solution: at most 3 of 100 break that law."""
+    broken = 0
+    for seed in range(100):
+        recording = chutelab.simulate(draw(seed), engine="contact")
+        broken += {law.law for law in recording.laws} == {"no loss is negative"}
+        assert broken <= 3
+        assert abs(recording.ledger.residual) <= 1e-11 * recording.ledger.turned_over

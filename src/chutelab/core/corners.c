@@ -381,28 +381,42 @@ static void bring_along(Contact *c, double t) {
     lean(c, 0.5 * (u[0] - hop), u[1] + c->other[1] - c->moved[1]);
 }
 
+/* Bound on the change of the velocity of a particle's corners by the solve of the step, m/s. */
+static double change_of(const Disk *d) {
+    return fabs(d->vx - d->ux) + fabs(d->vy - d->uy) + d->radius * fabs(d->spin - d->uspin);
+}
+
+/* Let the track of a particle go on from the middle of its last impulses to here, without a knot at their end. */
+static void go_smoothly(int i) {
+    W.tracks[i].lasted = 0;
+    was_moved(i);
+}
+
 /* Before an impact, bring the contacts of an island from their hops to the smooth path: else the velocity of the hop,
    which is of first order in the step, would enter the impact. Impulses of the step that are not due yet are taken back,
-   those that are due are given. This is done once a step, as the step ends soon after. Not in a crowd, which is not
-   solved again at each impact; not for contacts with a moving surface, which has to press as hard as it moves, or that
-   had an impact at the beginning of the step; and not with joints, whose pull is constant over the step. */
+   those that are due are given: a contact that is new since an impact has pressed only since then. This is done once a step,
+   as the step ends soon after. Not in a crowd, which is not solved again at each impact; not for contacts with a moving
+   surface, which has to press as hard as it moves; not where the solve has changed a velocity by more than hops do, as a blow
+   does; and not with joints, whose pull is constant over the step. */
 static void end_hops(int i, double t) {
     const Contact *first = 0, *end = W.contacts + W.contact_count;
     int count = 0, many = 0, stamp = W.step_count + 1;
-    double past = W.tracks[i].lasted > 1 ? W.length_before : 0;
+    double fresh = 2 * MAX(W.t - W.disks[i].since, 0), past = W.length_before;
+    if (W.tracks[i].lasted <= 1) past = MIN(fresh, past);
     for (int link = W.disks[i].links; link >= 0 && !first; link = W.links[link]) first = W.contacts + link / 2;
     if (!first || t <= W.t || !are_few(W.contact_count) || W.disks[i].smooth == stamp) return;
-    W.disks[i].smooth = stamp;
-    int island = first->island;
+    int island = first->island, is_blow = 0;
     while (first > W.contacts && first[-1].island == island) first--;
     for (const Contact *c = first; c < end && c->island == island; c++) {
-        double u[3], whirl = whirl_of(W.disks + c->i) + (c->j < 0 ? 0 : whirl_of(W.disks + c->j));
-        relative(c, 1, u);
-        int is_blow = u[0] < -W.soft - 2 * whirl * W.step, moves = c->j < 0 && stirs(W.surfaces + (-1 - c->j));
-        int tied = is_tied(c->i) || is_tied(c->j);
-        count += is_blow || moves || tied ? FEW_CONTACTS + 1 : 1;
+        Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+        double hop = W.soft + 2 * W.step * (whirl_of(a) + (c->j < 0 ? 0 : whirl_of(b)));
+        is_blow |= change_of(a) > hop || (c->two && change_of(b) > hop);
+        is_blow |= (c->j < 0 && stirs(W.surfaces + (-1 - c->j))) || is_tied(c->i) || is_tied(c->j);
+        a->smooth = stamp;
+        if (c->two) b->smooth = stamp;
+        count++;
     }
-    if (count > FEW_CONTACTS) return;
+    if (is_blow) return;
     for (const Contact *c = first; c < first + count; c++) {
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
         if (a->mode != FREE || (c->j >= 0 && b->mode != FREE)) continue;
@@ -411,12 +425,6 @@ static void end_hops(int i, double t) {
         advance(a, t);
         if (c->two) advance(b, t);
         if (c->impulse[0] > 0 && c->cornered && c->turns > 0) bring_along(&last, t);
-        was_moved(c->i);
-        a->smooth = stamp;
-        if (c->two) {
-            was_moved(c->j);
-            b->smooth = stamp;
-        }
         if (c->impulse[0] == 0) continue;
         for (int n = 0; n < 3; n++)
             last.impulse[n] = change[n] = -c->impulse[n] * (W.length - 2 * (t - W.t)) / (past + W.length);
@@ -424,15 +432,28 @@ static void end_hops(int i, double t) {
         push(&last, change);
         relative(&last, 0, v);
         share_out(&last, u, v, 0, last.entries, given);
+        if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
         bear_contact(&last, 1, t, t);
         keep_impulse(&last, 1, t, t);
         W.earlier[many++] = last;
     }
-    /* As in a step, only the sum of the losses has a meaning. */
+    /* As in a step, only the sum of the losses has a meaning. What is taken back was booked ahead, so in these shares. */
+    double sum = 0, ahead = 0;
     pool(W.earlier, many, 0);
+    for (const Contact *c = W.earlier; c < W.earlier + many; c++) {
+        sum += c->entries[1] + c->entries[2];
+        ahead += c->later[1] + c->later[2];
+    }
+    for (Contact *c = W.earlier; c < W.earlier + many && sum < 0 && ahead > 0; c++)
+        for (int k = 1; k < 3; k++) c->entries[k] = sum * c->later[k] / ahead;
     for (const Contact *c = W.earlier; c < W.earlier + many; c++)
         book(W.disks[c->i].entries, c->two ? W.disks[c->j].entries : 0, c->owner, c->entries);
     give_back(W.earlier, many);
+    for (const Contact *c = first; c < first + count; c++) {
+        if (W.disks[c->i].mode != FREE || (c->j >= 0 && W.disks[c->j].mode != FREE)) continue;
+        go_smoothly(c->i);
+        if (c->two) go_smoothly(c->j);
+    }
     W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
 }
 
@@ -474,6 +495,8 @@ RARELY void strike_corners(int i, int j, double t) {
         calm |= drawn > 0 && back[n] <= drawn * W.step;
         int ends = rest < 1 && (impacts >= JAM || (impacts >= FEW && approach < SLOW * W.g * W.dt));
         if (approach > 0 && (calm || ends)) back[n] = 0;
+        /* Impacts that do not end although nothing bounces are driven: friction is lowered, as where sweeps do not end. */
+        if (rest < 1 && impacts >= FEW) list[n].friction = MIN(c->friction, ROUGH) / (1 << MIN(impacts / FEW, 30));
         rests |= approach > 0 && back[n] == 0;
     }
     /* An impact that was foreseen, but does not happen, is counted, so that it is left to the next step in the end. */

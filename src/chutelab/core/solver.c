@@ -37,6 +37,10 @@
    would press it deeper, a little in each step. */
 #define YIELDS 0.1
 
+/* Bodies are wedged if a drive presses one with more than so many times the momentum of their island: weight and
+   soft blows do not. */
+#define WEDGED 4
+
 /* Whether a surface that moves drives a disk. */
 static int drives(const Contact *c) { return c->j < 0 && c->other[1] - c->moved[1] != 0; }
 /* Whether a surface drives or pushes, with any force that it takes. */
@@ -62,11 +66,23 @@ static int stall(Contact *list, int count, double least, double enough) {
     return stalled;
 }
 
-/* Multiply the friction of rows that the last sweep changed by `least` m/s or more by a factor. */
-static void ease_friction(Contact *list, int count, double least, double by) {
+/* Impulse beyond which the bodies of an island are wedged by its drives, N s: WEDGED times their momentum at the speed of
+   the fastest one, each contact counted. */
+static double wedged_from(const Contact *list, int count) {
+    double sum = 0, speed = W.g * W.step;
+    for (const Contact *c = list; c < list + count; c++) {
+        if (c->j < 0) speed = MAX(speed, fabs(c->other[0]) + fabs(c->other[1]));
+        sum += W.disks[c->i].mass + (c->two ? W.disks[c->j].mass : 0);
+    }
+    return WEDGED * sum * speed;
+}
+
+/* Multiply the friction of rows by a factor that the last sweep changed by `least` m/s or more, or whose impulse is `most`
+   N s or more. */
+static void ease_friction(Contact *list, int count, double least, double most, double by) {
     for (SolverRow *r = W.rows; r < W.rows + count; r++) {
         Contact *c = list + r->from;
-        if (r->change < least) continue;
+        if (r->change < least && r->impulse[0] < most) continue;
         c->share *= by;
         r->rough = c->share * MIN(c->friction, ROUGH);
         r->arm = c->share * c->arm;
@@ -82,8 +98,9 @@ static void ease_friction(Contact *list, int count, double least, double by) {
    finely. After the last round it is good enough if the changes still shrink, but with a drive only if gaps miss no more than
    GROSS times `enough`.
 
-   Else, and where sweeps diverge, the rigid bodies may have no solution: they are driven into a wedge that locks itself. Then
-   friction is lowered, from contacts that change most, until there is one. If a drive presses, it presses harder in each
+   Else, and where sweeps diverge or the bodies are wedged, rigid ones may have no solution, or one with any force: they are
+   driven into a wedge that locks itself. Then friction is lowered, from contacts that change or press most, until there is
+   one. If a drive presses, it presses harder in each
    sweep: closed gaps alone prove nothing there, the changes have to end, too. A disk that cannot turn, held by friction that
    locks, would slip through if friction were lowered: it stalls the drive for this step, and for all impacts in it. So does a
    disk that is blocked on a belt with practically unbounded friction.
@@ -104,6 +121,7 @@ int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, 
         /* Plain sweeps show by their changes what has to stall. */
         if (drives(c) && c->friction > ROUGH && W.disks[c->i].inertia == 0) plain = sweeps;
     }
+    double wedged = driven && cornered ? wedged_from(list, count) : INFINITY, hardest = 0;
     set_rows(list, count);
     if (!cornered || count <= FEW_CONTACTS) lessen();
     for (int left = TRIES, more = rounds;;) {
@@ -117,8 +135,11 @@ int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, 
         keep_bounds();
         if (!ended || W.interact) lessened = lessen();
         if (left == 0) break;
+        hardest = 0;
+        for (int n = 0; n < count && wedged < INFINITY; n++) hardest = MAX(hardest, W.rows[n].impulse[0]);
+        int locked = hardest > wedged;
         int stalled = driven && change < INFINITY && stall(list, count, INFINITY, enough);
-        if (!stalled) {
+        if (!stalled && !locked) {
             int gross = driven && change < INFINITY && left_open() > GROSS * enough;
             if (ended && (fine || (more < 2 && !gross))) break;
             if (ended) accurate *= 0.1;
@@ -133,11 +154,11 @@ int sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, 
             worst = 0;
             for (int n = 0; n < count; n++) worst = MAX(worst, W.rows[n].change);
             stalled = driven && stall(list, count, FOLLOWS * worst, INFINITY);
-        }
+        } else if (locked) worst = INFINITY;
         more = rounds;
         before = INFINITY;
         if (!stalled) {
-            ease_friction(list, count, FOLLOWS * worst, left > 1 ? 0.25 : 0);
+            ease_friction(list, count, FOLLOWS * worst, locked ? FOLLOWS * hardest : INFINITY, left > 1 ? 0.25 : 0);
             left--;
         }
         begin_anew();

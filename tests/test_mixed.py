@@ -738,8 +738,8 @@ def wedged(seed):
 
 @pytest.mark.parametrize(
     ("draw", "seed"),
-    [*((gripped, seed) for seed in (0, 1, 2, 24, 40, 61, 85)),
-     *((wedged, seed) for seed in (0, 1, 2, 38, 41, 43, 56, 80))],
+    [*((gripped, seed) for seed in (0, 1, 24, 40, 61, 85, 86, 89)),
+     *((wedged, seed) for seed in (0, 1, 38, 41, 43, 56, 80, 90))],
 )  # fmt: skip
 def test_random_polygons_on_belts_that_grip_or_wedge_them_keep_the_laws(draw, seed):
     """Those from 24 on broke one: losses of up to 3 J were given back, and overlaps were 8 %."""
@@ -750,10 +750,12 @@ def test_random_polygons_on_belts_that_grip_or_wedge_them_keep_the_laws(draw, se
 @pytest.mark.filterwarnings("ignore:LAW BROKEN, no loss is negative")
 @pytest.mark.parametrize("draw", [gripped, wedged])
 def test_few_belts_that_wedge_polygons_gain_from_losses_and_they_are_told(draw):
-    """Rigid bodies in a wedge may have no solution: at most 3 of 100 break that law."""
-    broken = 0
+    """Rigid bodies in a wedge may have no solution: at most 2 of 100 break that law."""
+    broken = []
     for seed in range(100):
         recording = chutelab.simulate(draw(seed), engine="contact")
-        broken += {law.law for law in recording.laws} == {"no loss is negative"}
-        assert broken <= 3
+        assert {law.law for law in recording.laws} <= {"no loss is negative"}
+        broken += [law.amount for law in recording.laws]
         assert abs(recording.ledger.residual) <= 1e-11 * recording.ledger.turned_over
+    assert len(broken) <= 2
+    assert min(broken, default=0.0) > -0.2

@@ -533,15 +533,21 @@ class Recording {
     if (!step) return null;
     const [a, b, s] = step;
     const between = a.map((value, k) => value + s * (b[k] - value));
-    // What is released at or after the beginning of a step is not in the totals of that instant.
-    this.tracks.forEach(({ begin }, index) => {
+    // What is released in the step is not in the totals at its beginning. What is released at that
+    // very instant is, if they were noted after it: the energies released by both ends tell.
+    const all = this.tracks.flatMap(({ begin }, index) => {
       const its = begin >= a[0] && begin < b[0] ? this.ledgerOf(index, begin) : null;
-      if (!its) return;
+      return its ? [{ begin, its }] : [];
+    });
+    const later = all.filter(({ begin }) => begin > a[0]);
+    const missed = (list: typeof all) =>
+      Math.abs(b[7] - a[7] - list.reduce((sum, { its }) => sum + its.start, 0));
+    for (const { begin, its } of missed(all) < missed(later) ? all : later) {
       const counted = Number(t >= begin) - s;
       between[1] += counted * its.kinetic;
       between[2] += counted * its.potential;
       between[7] += counted * its.start;
-    });
+    }
     const [, kinetic, potential, work, restitution_loss, friction_loss, , released, kept, spring,
       damper_loss, gave] = between;
     const push_work = this.pushedAt(t, work - gave), start = released + kept;

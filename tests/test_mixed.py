@@ -1,13 +1,14 @@
 """Boxes and polygons with all else of a machine, by closed forms; and Pymunk at its order."""
 
 from dataclasses import replace
-from math import atan2, cos, pi, sin, sqrt
+from math import atan2, cos, pi, radians, sin, sqrt, tan
 
 import numpy as np
 import pytest
 
 import chutelab
 from chutelab.results.laws import judge
+from machines import face
 from shared import seeds, some
 from test_hinge import drawn as hung
 from test_hinge import sound
@@ -682,6 +683,35 @@ def test_a_box_that_falls_on_a_belt_with_adhesion_is_gripped(drop):
         rear = x + 0.5 * spin * H, y - 0.5 * spin * W
         assert rear == pytest.approx((v, 0.0), abs=1e-5)
         assert spin > 0.0
+
+
+@pytest.mark.parametrize("speed", [0.002, 0.02, 2.0])
+@pytest.mark.parametrize("friction", [0.3, 1.65])
+def test_a_belt_slips_under_a_box_in_a_nip(friction, speed):
+    """Under a smooth wall that leans back by α, N2 sin α = µ N1 and N1 = m g + N2 cos α: the belt
+    pays µ N1 v with N1 = m g / (1 - µ cot α), here up to 21 m g.
+
+    With h = w cot α / 2 both forces act at the middle of the box. On a slow belt it comes asleep.
+    """
+    angle, width = radians(60.0), 0.02
+    height = 0.5 * width / tan(angle)
+    start, end = (
+        [0.003 * cos(angle), height - 0.003 * sin(angle)],
+        [-0.15, height + 0.15 * tan(angle)],
+    )
+    recording = chutelab.simulate({
+        "particle": {"shape": "box", "size": [width, height], "mass": 0.008, "spin": True},
+        "surface": [face("belt", (-1.0, 0.0), (1.0, 0.0), speed=speed, friction=friction),
+                    face("wall", start, end, friction=0.0)],
+        "stream": {"at": [-0.5 * width - 0.002, 0.5 * height], "velocity": [0.0, 0.0],
+                   "interact": True, "restitution": 0.0},
+        "run": {"until": 4.0, "engine": "contact"},
+    })  # fmt: skip
+    work, times = recording.totals["entries"][:, 0], recording.totals["t"]
+    power = float(np.diff(np.interp([3.0, 4.0], times, work))[0])
+    load = 0.008 * G / (1.0 - friction / tan(angle))
+    assert power == pytest.approx(friction * load * speed, rel=1e-6)
+    assert sound(recording).track(0)["velocity"][-1] == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
 def gripped(seed):

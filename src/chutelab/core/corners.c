@@ -386,6 +386,8 @@ static double change_of(const Disk *d) {
     return fabs(d->vx - d->ux) + fabs(d->vy - d->uy) + d->radius * fabs(d->spin - d->uspin);
 }
 
+static int is_free(const Contact *c) { return W.disks[c->i].mode == FREE && (c->j < 0 || W.disks[c->j].mode == FREE); }
+
 /* Let the track of a particle go on from the middle of its last impulses to here, without a knot at their end. */
 static void go_smoothly(int i) {
     W.tracks[i].lasted = 0;
@@ -405,21 +407,21 @@ static void end_hops(int i, double t) {
     if (W.tracks[i].lasted <= 1) past = MIN(fresh, past);
     for (int link = W.disks[i].links; link >= 0 && !first; link = W.links[link]) first = W.contacts + link / 2;
     if (!first || t <= W.t || !are_few(W.contact_count) || W.disks[i].smooth == stamp) return;
-    int island = first->island, is_blow = 0;
+    int island = first->island, stays = 0;
     while (first > W.contacts && first[-1].island == island) first--;
     for (const Contact *c = first; c < end && c->island == island; c++) {
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
         double hop = W.soft + 2 * W.step * (whirl_of(a) + (c->j < 0 ? 0 : whirl_of(b)));
-        is_blow |= change_of(a) > hop || (c->two && change_of(b) > hop);
-        is_blow |= (c->j < 0 && stirs(W.surfaces + (-1 - c->j))) || is_tied(c->i) || is_tied(c->j);
+        stays |= change_of(a) > hop || (c->two && change_of(b) > hop);
+        stays |= (c->j < 0 && stirs(W.surfaces + (-1 - c->j))) || is_tied(c->i) || is_tied(c->j);
         a->smooth = stamp;
         if (c->two) b->smooth = stamp;
         count++;
     }
-    if (is_blow) return;
+    if (stays) return;
     for (const Contact *c = first; c < first + count; c++) {
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-        if (a->mode != FREE || (c->j >= 0 && b->mode != FREE)) continue;
+        if (!is_free(c)) continue;
         double u[3], v[3], given[3], change[3];
         Contact last = *c;
         advance(a, t);
@@ -439,18 +441,19 @@ static void end_hops(int i, double t) {
     }
     /* As in a step, only the sum of the losses has a meaning. What is taken back was booked ahead, so in these shares. */
     double sum = 0, ahead = 0;
-    pool(W.earlier, many, 0);
     for (const Contact *c = W.earlier; c < W.earlier + many; c++) {
         sum += c->entries[1] + c->entries[2];
         ahead += c->later[1] + c->later[2];
     }
-    for (Contact *c = W.earlier; c < W.earlier + many && sum < 0 && ahead > 0; c++)
+    int returns = sum < 0 && ahead > 0;
+    if (!returns) pool(W.earlier, many, 0);
+    for (Contact *c = W.earlier; c < W.earlier + many && returns; c++)
         for (int k = 1; k < 3; k++) c->entries[k] = sum * c->later[k] / ahead;
     for (const Contact *c = W.earlier; c < W.earlier + many; c++)
         book(W.disks[c->i].entries, c->two ? W.disks[c->j].entries : 0, c->owner, c->entries);
     give_back(W.earlier, many);
     for (const Contact *c = first; c < first + count; c++) {
-        if (W.disks[c->i].mode != FREE || (c->j >= 0 && W.disks[c->j].mode != FREE)) continue;
+        if (!is_free(c)) continue;
         go_smoothly(c->i);
         if (c->two) go_smoothly(c->j);
     }
@@ -495,8 +498,10 @@ RARELY void strike_corners(int i, int j, double t) {
         calm |= drawn > 0 && back[n] <= drawn * W.step;
         int ends = rest < 1 && (impacts >= JAM || (impacts >= FEW && approach < SLOW * W.g * W.dt));
         if (approach > 0 && (calm || ends)) back[n] = 0;
-        /* Impacts that do not end although nothing bounces are driven: friction is lowered, as where sweeps do not end. */
-        if (rest < 1 && impacts >= FEW) list[n].friction = MIN(c->friction, ROUGH) / (1 << MIN(impacts / FEW, 30));
+        /* A drive that strikes it time and again within a step, though hardly anything bounces, slips. */
+        int driven = j < 0 && c->other[1] != c->moved[1];
+        if (driven && rest < 1 && impacts >= FEW)
+            list[n].friction = MIN(c->friction, ROUGH) / (1 << MIN(impacts / FEW, 30));
         rests |= approach > 0 && back[n] == 0;
     }
     /* An impact that was foreseen, but does not happen, is counted, so that it is left to the next step in the end. */

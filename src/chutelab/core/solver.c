@@ -39,7 +39,7 @@
 
 /* Bodies are wedged if a drive presses one with more than so many times the momentum of their island: weight and
    soft blows do not. */
-#define WEDGED 4
+#define WEDGED 8
 
 /* Whether a surface that moves drives a disk. */
 static int drives(const Contact *c) { return c->j < 0 && c->other[1] - c->moved[1] != 0; }
@@ -67,12 +67,15 @@ static int stall(Contact *list, int count, double least, double enough) {
 }
 
 /* Impulse beyond which the bodies of an island are wedged by its drives, N s: WEDGED times their momentum at the speed of
-   the fastest one, each contact counted. */
+   the fastest one, each contact counted. On a slow one a nip that holds may bear more; so the speed is at least that of a fall
+   by half a radius, which is some thirty times the weight's in a step. */
 static double wedged_from(const Contact *list, int count) {
-    double sum = 0, speed = W.g * W.step;
+    double sum = 0, speed = 0;
     for (const Contact *c = list; c < list + count; c++) {
+        const Disk *a = W.disks + c->i;
+        speed = MAX(speed, sqrt(W.g * a->radius));
         if (c->j < 0) speed = MAX(speed, fabs(c->other[0]) + fabs(c->other[1]));
-        sum += W.disks[c->i].mass + (c->two ? W.disks[c->j].mass : 0);
+        sum += a->mass + (c->two ? W.disks[c->j].mass : 0);
     }
     return WEDGED * sum * speed;
 }
@@ -100,10 +103,10 @@ static void ease_friction(Contact *list, int count, double least, double most, d
 
    Else, and where sweeps diverge or the bodies are wedged, rigid ones may have no solution, or one with any force: they are
    driven into a wedge that locks itself. Then friction is lowered, from contacts that change or press most, until there is
-   one. If a drive presses, it presses harder in each
-   sweep: closed gaps alone prove nothing there, the changes have to end, too. A disk that cannot turn, held by friction that
-   locks, would slip through if friction were lowered: it stalls the drive for this step, and for all impacts in it. So does a
-   disk that is blocked on a belt with practically unbounded friction.
+   one. If a drive presses, it presses harder in each sweep: closed gaps alone prove nothing there, the changes have to end,
+   too. A disk that cannot turn, held by friction that locks, would slip through if friction were lowered: it stalls the
+   drive for this step, and for all impacts in it. So does a disk that is blocked on a belt with practically unbounded
+   friction.
 
    The impulses of the step before are taken as far as they lower the cost, see `lessen`: where a contact has opened, those of
    its neighbours would throw disks out. But not in a crowd with corners: the share is that of the whole island, so for a blow

@@ -42,14 +42,16 @@ double set_gates(double t) {
     return W.gate_count || W.mover_count ? next_gate(t) : INFINITY;
 }
 
-/* Wake a sleeper that rides a belt where the belt ends, and one that a moving surface reaches. */
+/* Wake a sleeper that rides a belt where the belt ends, and one that a moving surface reaches. One with corners wakes before it
+   reaches anything: a slow blow is left to a contact, which sleepers have not. */
 static void look_ahead(int i) {
     Disk *d = W.disks + i;
     const int *list;
     double nx, ny;
-    int count = W.stirs ? surfaces_near(i, &list) : 0;
+    int arrives = has_corners(d) && (d->ux != 0 || d->uy != 0), count = W.stirs || arrives ? surfaces_near(i, &list) : 0;
     for (int n = 0; n < count; n++) {
-        if (!stirs(W.surfaces + list[n]) || !is_near(W.surfaces + list[n], d)) continue;
+        if (!is_near(W.surfaces + list[n], d)) continue;
+        if (!stirs(W.surfaces + list[n]) && !(arrives && !is_held(d, list[n]))) continue;
         if (gap_to(surface_at(list[n], W.t), d->x, d->y, d->radius, &nx, &ny) > TOUCH * d->radius) continue;
         wake(i, W.t);
         return;

@@ -714,6 +714,23 @@ def test_a_belt_slips_under_a_box_in_a_nip(friction, speed):
     assert sound(recording).track(0)["velocity"][-1] == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
+@pytest.mark.parametrize("shape", [{"radius": 0.005}, {"shape": "box", "size": [0.01, 0.01]}])
+@pytest.mark.parametrize("speed", [0.001, 0.003, 0.02])
+def test_a_belt_carries_a_sleeper_to_another_one_that_it_pushes_along(speed, shape):
+    """Both are 0.01 m long: that is their distance then."""
+    meets = {"velocity": [0.0, 0.0], "interact": True, "restitution": 0.0, "friction": 0.3}
+    recording = sound(chutelab.simulate({
+        "particle": {**shape, "mass": 0.008, "spin": "size" in shape},
+        "surface": [face("belt", (-1.0, 0.0), (0.0, 0.0), speed=speed, friction=0.5),
+                    face("floor", (0.0, 0.0), (1.0, 0.0), friction=0.05)],
+        "stream": [{"at": [0.0055, 0.005], **meets}, {"at": [-0.03, 0.005], **meets}],
+        "run": {"until": 0.028 / speed, "engine": "contact"},
+    }))  # fmt: skip
+    (lies, _), (comes, _) = recording.at([recording.totals["t"][-1]])[0][0]
+    assert lies > 0.0057
+    assert lies - comes == pytest.approx(0.01, abs=2e-5)
+
+
 def gripped(seed):
     """Draw balls that a belt carries by adhesion, and boxes or polygons that fall among them."""
     random = np.random.default_rng(seed)

@@ -65,6 +65,8 @@ enum Phase { PART, STEP, WITHIN };
 #define REST 2.5e-3
 /* m/s2; gravity for which bounds on speeds and times are written; for another one they are scaled by `W.pace`. */
 #define EARTH 9.81
+/* m/s on Earth; surfaces, and sleepers on them, whose velocities differ by less move alike. */
+#define SAME_SPEED 1e-12
 /* s on Earth; a particle has to be at rest for so long before it sleeps. */
 #define CALM_DOWN 0.05
 /* Share of the speed; a slower approach is a grazing one, and may be rounding. */

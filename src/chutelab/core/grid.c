@@ -120,10 +120,33 @@ static void add_near(int n, int i, int j) {
     }
 }
 
+/* Whether two sleepers move apart or towards each other: belts carry them, or one of them. */
+static int differ(const Disk *a, const Disk *b) {
+    double most = SAME_SPEED * W.pace;
+    return a->mode == ASLEEP && b->mode == ASLEEP && (fabs(a->ux - b->ux) > most || fabs(a->uy - b->uy) > most);
+}
+
+/* Whether a disk looks for those that it may meet: a free one, or a sleeper that a belt carries if sleepers may `meet`. */
+static int seeks(const Disk *d, int meet) {
+    return d->mode == FREE || (meet && d->mode == ASLEEP && (d->ux != 0 || d->uy != 0));
+}
+
+/* Whether any two sleepers do. */
+static int any_differ(void) {
+    const Disk *one = 0;
+    for (EACH_LIVE(i)) {
+        const Disk *d = W.disks + i;
+        if (d->mode != ASLEEP) continue;
+        if (!one) one = d;
+        if (differ(one, d)) return 1;
+    }
+    return 0;
+}
+
 /* List all pairs that may meet before `end`; return 0 if there is no room for them. */
 int list_near(double end) {
     double extent = 0;
-    int live = 0;
+    int live = 0, meet = W.interact && any_differ();
     W.near_count = W.later_count = W.cell_count = W.wide_count = 0;
     has_all = 1;
     for (int k = 0; k < 4; k++) around[k] = k < 2 ? INFINITY : -INFINITY;
@@ -134,7 +157,7 @@ int list_near(double end) {
         box_of(d, end, W.interact ? SKIN : 0, &d->left);
         extent += MAX(d->right - d->left, d->top - d->bottom);
         live++;
-        if (d->mode != FREE) continue;
+        if (!seeks(d, meet)) continue;
         around[0] = MIN(around[0], d->left);
         around[1] = MIN(around[1], d->bottom);
         around[2] = MAX(around[2], d->right);
@@ -144,19 +167,20 @@ int list_near(double end) {
     /* With cells of 1.5 times the mean box, most boxes overlap two to four cells. */
     W.cell = live ? 1.5 * extent / live : 1;
     memset(W.heads, 0xff, (unsigned long)W.bucket_count * sizeof(int));
-    /* Riders and sleepers can meet free disks only: they are entered first and query no others. */
+    /* Riders and most sleepers can meet free disks only: they are entered first and query no others. */
     for (EACH_LIVE(i)) {
-        if (W.disks[i].mode == FREE) continue;
+        if (seeks(W.disks + i, meet)) continue;
         if (overlaps(W.disks + i, around)) enter(i, span_of(&W.disks[i].left));
         else has_all = 0;
     }
     for (EACH_LIVE(i)) {
         const Disk *d = W.disks + i;
-        if (d->mode != FREE) continue;
+        if (!seeks(d, meet)) continue;
         Span span = span_of(&d->left);
         int n = query(i, &d->left, span);
         for (int k = 0; k < n; k++) {
-            if (!can_collide(i, W.found[k])) continue;
+            const Disk *o = W.disks + W.found[k];
+            if (!can_collide(i, W.found[k]) || (d->mode != FREE && o->mode != FREE && !differ(d, o))) continue;
             if (W.near_count >= W.near_room) return 0;
             add_near(W.near_count++, W.found[k], i);
         }

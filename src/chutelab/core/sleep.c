@@ -8,8 +8,6 @@
 
 #include "core.h"
 
-/* m/s on Earth; surfaces whose velocities differ by less move alike. */
-#define ALIKE 1e-12
 /* Change of the force on a sleeper that wakes it: this share of its weight, and of the force when it fell asleep. */
 #define MORE 0.5
 #define BY 0.2
@@ -190,7 +188,7 @@ void rouse(void) {
 /* Whether a surface with the velocity (x, y) moves like the earlier ones of a group, whose velocity is `u`. The first one,
    while `owner` is -1, sets it. `owner` becomes `next`. */
 static int moves_alike(double *u, double x, double y, int *owner, int next) {
-    if (*owner >= 0 && (fabs(u[0] - x) > ALIKE * W.pace || fabs(u[1] - y) > ALIKE * W.pace)) return 0;
+    if (*owner >= 0 && (fabs(u[0] - x) > SAME_SPEED * W.pace || fabs(u[1] - y) > SAME_SPEED * W.pace)) return 0;
     u[0] = x;
     u[1] = y;
     *owner = next;

@@ -326,7 +326,15 @@ int find_contacts(double h, int *woke) {
     W.contact_count = 0;
     *woke = 0;
     for (int n = 0; n < W.near_count; n++) {
-        int i = W.near[2 * n], j = W.near[2 * n + 1], cornered = is_cornered(i, j);
+        int i = W.near[2 * n], j = W.near[2 * n + 1];
+        if (sleeps(i) && sleeps(j)) {
+            /* A belt carries one of them to the other. */
+            wake(i, W.t);
+            if (sleeps(j)) wake(j, W.t);
+            *woke = 1;
+            continue;
+        }
+        int cornered = is_cornered(i, j);
         int both = cornered && W.disks[i].corners && W.disks[j].corners;
         if (cornered && (both ? W.disks[i].mode != FREE : !W.disks[i].corners)) { int k = i; i = j; j = k; }
         Disk *a = W.disks + i, *b = W.disks + j;
